@@ -1,0 +1,166 @@
+"""Pieces of cloth: the shortest seams for which no edge is strained by more than the material allows.
+
+The cones of a texture with a small energy give the seams, and where few edges are still strained too much, slits from
+the nearest seam relax them. The energy is varied, and the shortest seams are kept.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from ... import TriangleMesh, unwrap
+from ...base import BoolArray, FloatArray, IntArray, mask_of
+from ...errors import MetricError
+from ...geometry import angle_defect, corner_angles, edge_lengths
+from ...linalg.shortest_paths import MultiGraph
+from ...mesh import label_components
+from .cut_surface import CutSurface
+from .separation import without_overlaps
+from .strain import Stretch, least_strain, relative_strains, with_equal_sides
+
+# The symmetric Dirichlet energy of an isometry.
+ISOMETRIC = 4.0
+# The energy above that of an isometry, relative to the squared strain that is allowed, of the first texture. Strains
+# that are evenly distributed up to the bound in all directions give 8/3.
+ENERGY_PER_STRAIN = 3.0
+# Multiples of it that are tried.
+ENERGY_FACTORS = (1.0, 2.0, 0.5)
+# Exponents of the strain: of layouts in which it is evened out moderately, and then for the smallest largest one.
+EVEN, SMALLEST = (2, 4), (8, 16, 32)
+# Fraction of edges beyond the bound above which the seams of a texture are too few, so that slits cannot help.
+MAX_STRAINED = 0.5
+# Rounds of slits, each at the worst vertex of every strained region.
+ROUNDS = 12
+# Excess of the relative strain that is left to rounding.
+ROUNDING = 1e-9
+# The strain that layouts aim at, relative to the bound: making the sides of seams equally long adds a little.
+AIM = 0.99
+
+
+def cut_cloth(mesh: Any, stretch: Stretch, **options: Any) -> CutSurface:
+    """Return a mesh cut into the pieces with the shortest seams that were found for a bound of the strain.
+
+    If no cut within the bound was found, it is the one with the smallest largest strain.
+
+    Args:
+        mesh: as for `coneflat.unwrap`.
+        stretch: the bound.
+        options: of `coneflat.unwrap`.
+    """
+    first = ENERGY_PER_STRAIN * (stretch.warp**2 + stretch.weft**2) / 2
+    candidates = []
+    for factor in ENERGY_FACTORS:
+        texture = unwrap(mesh, max_energy=ISOMETRIC + factor * first, packing_cuts=0.0, **options)
+        candidates.append(slit_until_within(CutSurface.of(texture), stretch))
+        if not len(texture.seams):
+            break
+    within = [candidate for candidate in candidates if not excess(candidate, stretch).any()]
+    if within:
+        return min(within, key=lambda candidate: candidate.seam_length)
+    return min(candidates, key=lambda candidate: excess(candidate, stretch).max())
+
+
+def excess(surface: CutSurface, stretch: Stretch) -> FloatArray:
+    """Return (k,) how far the relative strain of each flat edge is beyond the bound, 0 within it."""
+    strains = np.abs(relative_strains(surface.edges, surface.points, stretch))
+    return np.where(strains > 1 + ROUNDING, strains - 1, 0.0)
+
+
+def slit_until_within(surface: CutSurface, stretch: Stretch) -> CutSurface:
+    """Return a cut surface with slits from its seams, until its strain is within the bound, or no slit helps.
+
+    Slits end where the strain is concentrated if it is only moderately evened out: the more it is, the more edges have
+    the largest one.
+    """
+    even = _relaxed(surface, stretch, EVEN)
+    for _ in range(ROUNDS):
+        flat = without_overlaps(_relaxed(even, stretch, SMALLEST))
+        if len(flat.seams) > len(even.seams):
+            even = _relaxed(even.cut_along(flat.seams, flat.places), stretch, EVEN[-1:])
+            flat = _relaxed(even, stretch, SMALLEST)
+        closed = _with_equal_sides(flat)
+        beyond = excess(closed, stretch)
+        print("   ", len(surface.seams), len(even.seams), np.abs(even.edges.strains(even.points)).max(), (excess(even,stretch)>0).mean(), np.abs(closed.edges.strains(closed.points)).max(), (beyond>0).mean(), closed.pieces.max()+1, len(closed.overlaps()))
+        if not beyond.any() or (beyond > 0).mean() > MAX_STRAINED:
+            break
+        tips = _worst_vertices(even, excess(even, stretch), beyond > 0)
+        if not len(tips):
+            break
+        even = _relaxed(_with_slits(even, tips), stretch, EVEN[-1:])
+    return closed
+
+
+def _relaxed(surface: CutSurface, stretch: Stretch, exponents: Sequence[int]) -> CutSurface:
+    aim = Stretch(AIM * stretch.warp, AIM * stretch.weft)
+    points = least_strain(surface.edges, surface.corners, surface.points, aim, tuple(exponents))
+    return replace(surface, points=points)
+
+
+def _with_equal_sides(surface: CutSurface) -> CutSurface:
+    """Return a surface whose seams have sides of the same length, where that is possible."""
+    try:
+        points = with_equal_sides(surface.edges, surface.corners, surface.points)
+    except MetricError:
+        return surface  # The sides of seams are eased, which the pattern says.
+    return replace(surface, points=points)
+
+
+def _worst_vertices(surface: CutSurface, beyond: FloatArray, remains: BoolArray) -> IntArray:
+    """Return the vertices to which slits are cut: of each strained region, the most curved of the most strained ones.
+
+    Where a region has only vertices on seams, a neighbour is chosen.
+
+    Args:
+        surface: the surface.
+        beyond: (k,) the excess of the strain of its edges.
+        remains: (k,) edges whose strain remains too large if the largest strain is minimised. Only regions with such
+            edges count.
+    """
+    mesh, count = surface.mesh, len(surface.mesh.vertices)
+    angles = corner_angles(edge_lengths(mesh.vertices, mesh.faces))
+    curvature = np.abs(angle_defect(mesh.faces, angles, mesh.is_boundary_vertex))
+    ends = mesh.edges[surface.edges.edges]
+    score = np.bincount(ends.ravel(), np.repeat(beyond, 2), count)
+    is_strained = (score > 0) | mask_of(count, ends[remains])
+    inside = mesh.edges[is_strained[mesh.edges].all(axis=1)]
+    _, region = label_components(count, inside[:, 0], inside[:, 1])
+    tips = []
+    is_needed = mask_of(count, ends[remains])
+    for members in _groups(region, is_strained):
+        if not is_needed[members].any():
+            continue
+        inner = members[~surface.is_border_vertex[members]]
+        weight = score * curvature
+        if not len(inner):
+            inner = _inner_neighbours(mesh, surface.is_border_vertex, members)
+            weight = curvature
+        if len(inner):
+            tips.append(inner[np.argmax(weight[inner])])
+    return np.array(tips, dtype=np.int64)
+
+
+def _groups(label: IntArray, chosen: BoolArray) -> list[IntArray]:
+    """Return the chosen items of each label."""
+    items = np.flatnonzero(chosen)
+    items = items[np.argsort(label[items], kind="stable")]
+    return np.split(items, np.flatnonzero(np.diff(label[items])) + 1)
+
+
+def _inner_neighbours(mesh: TriangleMesh, is_border: BoolArray, vertices: IntArray) -> IntArray:
+    """Return the neighbours of vertices that are not on seams."""
+    is_given = mask_of(len(mesh.vertices), vertices)
+    ends = np.unique(mesh.edges[is_given[mesh.edges].any(axis=1)])
+    return ends[~is_border[ends]]
+
+
+def _with_slits(surface: CutSurface, tips: IntArray) -> CutSurface:
+    """Return a surface cut from each tip to the nearest seam or border."""
+    mesh = surface.mesh
+    graph = MultiGraph(len(mesh.vertices), mesh.edges, surface.edge_lengths, mesh.incident_edges)
+    paths = graph.shortest_paths(np.flatnonzero(surface.is_border_vertex))
+    nodes = paths.nodes_to(tips)
+    return surface.cut_along(np.union1d(surface.seams, paths.edge[nodes]))
