@@ -84,7 +84,6 @@ def slit_until_within(surface: CutSurface, stretch: Stretch) -> CutSurface:
             flat = _relaxed(even, stretch, SMALLEST)
         closed = _with_equal_sides(flat)
         beyond = excess(closed, stretch)
-        print("   ", len(surface.seams), len(even.seams), np.abs(even.edges.strains(even.points)).max(), (excess(even,stretch)>0).mean(), np.abs(closed.edges.strains(closed.points)).max(), (beyond>0).mean(), closed.pieces.max()+1, len(closed.overlaps()))
         if not beyond.any() or (beyond > 0).mean() > MAX_STRAINED:
             break
         tips = _worst_vertices(even, excess(even, stretch), beyond > 0)

@@ -1,0 +1,63 @@
+"""The pattern of a surface: pieces in the plane, in millimetres, and how they are sewn together."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from ...base import FloatArray, IntArray
+from .borders import Borders, Seam, find_borders
+from .cut_surface import CutSurface
+
+
+@dataclass(frozen=True, eq=False)
+class Pattern:
+    """Pieces of a surface that are cut out of cloth, paper or sheet; all lengths are millimetres.
+
+    Attributes:
+        kind: cloth, net, gores or sheet.
+        surface: the surface at its final size, cut into pieces, which lie side by side in the plane without overlap,
+            the grain along the second axis.
+        millimetres: millimetres per unit of the model.
+        folds: (f, 2) points of fold lines inside pieces, and `fold_angles` (f,) their dihedral angles in radians,
+            positive for mountain folds, negative for valleys.
+        notes: what could not be met, one sentence each.
+        settings: the options.
+    """
+
+    kind: str
+    surface: CutSurface
+    millimetres: float
+    folds: IntArray = field(default_factory=lambda: np.empty((0, 2), dtype=np.int64))
+    fold_angles: FloatArray = field(default_factory=lambda: np.empty(0))
+    notes: tuple[str, ...] = ()
+    settings: Mapping[str, Any] = field(default_factory=dict)
+
+    @cached_property
+    def borders(self) -> Borders:
+        """The borders of the pieces, their seams, darts and hems."""
+        return find_borders(self.surface)
+
+    @property
+    def piece_count(self) -> int:
+        """The number of pieces."""
+        return len(self.borders.loops)
+
+    @property
+    def seams(self) -> tuple[Seam, ...]:
+        """The seams between different pieces or parts of pieces, darts among them."""
+        return self.borders.seams
+
+    @property
+    def darts(self) -> tuple[Seam, ...]:
+        """The seams that end in a tip inside a piece."""
+        return tuple(seam for seam in self.seams if seam.is_dart)
+
+    @cached_property
+    def strains(self) -> FloatArray:
+        """(k,) the relative change of length of each edge of the pieces, `surface.edges`."""
+        return self.surface.edges.strains(self.surface.points)
