@@ -89,7 +89,7 @@ def slit_until_within(surface: CutSurface, stretch: Stretch) -> CutSurface:
         tips = _worst_vertices(even, excess(even, stretch), beyond > 0)
         if not len(tips):
             break
-        even = _relaxed(_with_slits(even, tips), stretch, EVEN[-1:])
+        even = _relaxed(even.cut_along(_with_slits(even, tips)), stretch, EVEN[-1:])
     return closed
 
 
@@ -156,10 +156,9 @@ def _inner_neighbours(mesh: TriangleMesh, is_border: BoolArray, vertices: IntArr
     return ends[~is_border[ends]]
 
 
-def _with_slits(surface: CutSurface, tips: IntArray) -> CutSurface:
-    """Return a surface cut from each tip to the nearest seam or border."""
+def _with_slits(surface: CutSurface, tips: IntArray) -> IntArray:
+    """Return the seams of a surface and cuts from each tip to the nearest seam or border."""
     mesh = surface.mesh
     graph = MultiGraph(len(mesh.vertices), mesh.edges, surface.edge_lengths, mesh.incident_edges)
     paths = graph.shortest_paths(np.flatnonzero(surface.is_border_vertex))
-    nodes = paths.nodes_to(tips)
-    return surface.cut_along(np.union1d(surface.seams, paths.edge[nodes]))
+    return np.union1d(surface.seams, paths.edge[paths.nodes_to(tips)])

@@ -11,7 +11,7 @@ from ... import TriangleMesh
 from ...base import FloatArray, IntArray
 from ...errors import MetricError
 from ...geometry import double_areas, edge_lengths, signed_double_areas
-from ...linalg import factorize
+from ...linalg import Factor, factorize
 
 # Exponents of the strain whose sums are minimised one after the other. The last ones all but minimise the largest.
 EXPONENTS = (2, 4, 8, 16, 32)
@@ -120,12 +120,18 @@ def least_strain(
     Notes:
         Newton's method with the positive part of the Hessian. The bounds by direction are those at the start of a step.
     """
+    factor: Factor | None = None
+    matrix: csc_matrix | None = None
     for exponent in exponents:
         model = _PowerSum(edges, corners, stretch, exponent)
         for _ in range(STEPS):
             bounds = stretch.bounds(edges.vectors(points))
             before = model.value(points, bounds)
-            step, slope = model.step(points, bounds)
+            gradient, hessian = model.derivatives(points, bounds)
+            matrix = _with_pattern_of(_regularised(hessian), matrix)
+            factor = factorize(matrix, factor)
+            step = -factor.solve(gradient)
+            slope, step = float(gradient @ step), step.reshape(-1, 2)
             length = _step_length(model, points, bounds, step, slope)
             points = points + length * step
             if length == 0 or -slope < GAIN * before:
@@ -156,8 +162,8 @@ class _PowerSum:
         areas = AREAS * float((ratios + 1 / ratios - 2).sum())
         return float(self.weights @ powers + self.difference_weights @ (self.differences @ strains) ** 2) + areas
 
-    def step(self, points: FloatArray, bounds: FloatArray) -> tuple[FloatArray, float]:
-        """Return the Newton step (n, 2), and the slope of the sum along it."""
+    def derivatives(self, points: FloatArray, bounds: FloatArray) -> tuple[FloatArray, csr_matrix]:
+        """Return (2n,) the gradient, and (2n, 2n) the positive part of the Hessian."""
         p, strains = self.exponent, self.edges.strains(points) / bounds
         size = np.abs(strains)
         slopes = self.weights * (2 * QUADRATIC * strains + p * size ** (p - 1) * np.sign(strains))
@@ -179,8 +185,7 @@ class _PowerSum:
             + rotation.T @ diags(np.maximum(slopes / (scale * norms), 0)) @ rotation
             + closing.T @ diags(2 * self.difference_weights) @ closing
         )
-        step = -_solution(hessian, gradient)
-        return step.reshape(-1, 2), float(gradient @ step)
+        return gradient, hessian
 
     def _jacobian(self, along: FloatArray, count: int) -> csr_matrix:
         return edge_jacobian(self.edges.ends, along, count)
@@ -206,11 +211,18 @@ def area_jacobian(
     return jacobian, signed_double_areas(places) / double_areas
 
 
-def _solution(hessian: csr_matrix, right: FloatArray) -> FloatArray:
+def _regularised(hessian: csr_matrix) -> csc_matrix:
     diagonal = hessian.diagonal()
     matrix = csc_matrix(hessian + REGULARISATION * diagonal.mean() * eye(len(diagonal)))
     matrix.sort_indices()
-    return factorize(matrix).solve(right)
+    return matrix
+
+
+def _with_pattern_of(matrix: csc_matrix, previous: csc_matrix | None) -> csc_matrix:
+    """Return a matrix that shares the indices of the previous one if they are equal, so that its analysis serves."""
+    if previous is not None and np.array_equal(matrix.indices, previous.indices):
+        matrix.indices = previous.indices
+    return matrix
 
 
 def _step_length(
