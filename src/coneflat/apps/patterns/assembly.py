@@ -1,0 +1,20 @@
+"""All pages of a pattern: how it is put together, and its tiles."""
+
+from __future__ import annotations
+
+from .drawing import Drawing
+from .pages import Page, tiled
+from .papers import Paper
+from .pattern import Pattern
+
+
+def pattern_pages(pattern: Pattern, drawing: Drawing, paper: Paper, title: str) -> list[Page]:
+    """Return the pages of a pattern: the assembly guide first on paper of a given size, else last.
+
+    Args:
+        pattern: the pattern.
+        drawing: its drawing.
+        paper: the paper.
+        title: text in the margins.
+    """
+    return tiled(drawing, paper, title)

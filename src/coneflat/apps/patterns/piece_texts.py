@@ -1,0 +1,117 @@
+"""Numbers, names, grain lines and angles: where they stand in a piece."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import product
+
+import numpy as np
+
+from ...base import FloatArray
+from .allowances import shapely
+from .drawing import Line, Text
+from .labels import LINE_HEIGHT, Labels, text_width, upright
+from .notches import distances
+
+# Heights of capitals, mm, the largest that has room is chosen: numbers of pieces, relative to the largest circle in a
+# piece and at most; what stands below them; names of seams; angles of folds.
+NUMBER_PER_RADIUS, MAX_NUMBER, MIN_NUMBER, BELOW_NUMBER = 0.35, 9.0, 1.2, 0.4
+SEAM_SIZES, ANGLE_SIZES = (3.0, 2.4, 1.8, 1.3), (2.0, 1.5, 1.2)
+MIN_TEXT = 1.3
+# Places along a side, as fractions of its length, and distances from it relative to the text, in the order in which
+# they are tried for its name.
+ALONG, INWARD = (0.5, 0.42, 0.58, 0.33, 0.67, 0.22, 0.78, 0.12, 0.88), (1.1, 1.6)
+# Longest grain line, length of the arms of its arrows, mm, and the fraction of the piece that it takes.
+MAX_GRAIN, ARROW, GRAIN_SHARE, MIN_GRAIN = 120.0, 3.0, 0.7, 10.0
+# Accuracy of the centre of a piece, relative to the size of the piece.
+CENTRE_ACCURACY = 0.01
+
+
+def add_number(room: Labels, piece: int, area: float) -> None:
+    """Place the number of a piece, its count and area around the centre of the largest circle inside."""
+    extent = np.ptp(np.asarray(room.piece.exterior.coords), axis=0).max()
+    circle = shapely().maximum_inscribed_circle(room.piece, tolerance=CENTRE_ACCURACY * float(extent))
+    centre, radius = np.asarray(circle.coords)[0], float(circle.length)
+    size = min(max(NUMBER_PER_RADIUS * radius, MIN_NUMBER), MAX_NUMBER)
+    below = max(BELOW_NUMBER * size, MIN_TEXT)
+    number = Text(str(piece + 1), centre, size)
+    details = f"cut 1 \u00b7 {area / 100:.3g} cm\u00b2"
+    # The block of two lines around the centre, or the number alone.
+    block = size + (LINE_HEIGHT + 0.3) * below
+    if np.hypot(block / 2, text_width(details, below) / 2) <= radius:
+        top = centre + np.array([0.0, (block - size) / 2])
+        room.add([Text(number.text, top, size)])
+        room.add([Text(details, top - np.array([0.0, (size + LINE_HEIGHT * below) / 2 + 0.3 * below]), below)])
+        return
+    room.add([Text(number.text, centre, size * shrink) for shrink in (1.0, 0.75, 0.5)])
+
+
+def add_grain(room: Labels) -> Iterator[Line]:
+    """Place a vertical line with arrows, the grain, where the piece is longest; yield its lines."""
+    low, _, high, _ = room.piece.bounds
+    columns = low + (high - low) * (np.arange(25) + 0.5) / 25
+    chords = [chord for x in columns.tolist() for chord in _chords(room, x)]
+    for x, bottom, top in sorted(chords, key=lambda chord: (round(chord[1] - chord[2], 3), chord[0])):
+        for share in (GRAIN_SHARE, GRAIN_SHARE / 2):
+            half = min(share * (top - bottom), MAX_GRAIN) / 2
+            if 2 * half < MIN_GRAIN:
+                return
+            middle = (top + bottom) / 2
+            ends = np.array([[x, middle - half], [x, middle + half]])
+            box = shapely().box(x - ARROW / 2 - 1, middle - half - 1, x + ARROW / 2 + 1, middle + half + 1)
+            if room.is_free(box):
+                room.cover(box)
+                yield Line("mark", ends)
+                for end, sign in ((ends[0], 1.0), (ends[1], -1.0)):
+                    arms = np.array([[-ARROW / 3, sign * ARROW], [0.0, 0.0], [ARROW / 3, sign * ARROW]])
+                    yield Line("mark", end + arms)
+                return
+
+
+def _chords(room: Labels, x: float) -> Iterator[tuple[float, float, float]]:
+    """Yield the parts of a vertical line inside a piece: its place, and the lower and upper ends."""
+    _, low, _, high = room.piece.bounds
+    line = shapely().LineString([(x, low - 1), (x, high + 1)])
+    for part in shapely().get_parts(shapely().intersection(room.piece, line)):
+        _, bottom, _, top = part.bounds
+        yield x, bottom, top
+
+
+def add_seam_name(room: Labels, name: str, side: FloatArray) -> None:
+    """Place the name of a seam along a side (k, 2), inside the piece, near its middle."""
+    along = distances(side)
+    room.add(
+        _beside(name, side, along, share, size, inward)
+        for size, inward, share in product(SEAM_SIZES, INWARD, ALONG)
+    )
+
+
+def _beside(name: str, side: FloatArray, along: FloatArray, share: float, size: float, inward: float) -> Text:
+    """Return a text beside a side; the direction is that of the part of the side as long as the text."""
+    half = min(text_width(name, size), float(along[-1])) / 2
+    middle = min(max(share * along[-1], half), along[-1] - half)
+    start, place, stop = (
+        np.array([np.interp(at, along, column) for column in side.T]) for at in (middle - half, middle, middle + half)
+    )
+    chord = stop - start
+    length = float(np.linalg.norm(chord))
+    direction = chord / length if length > 0 else np.array([1.0, 0.0])
+    normal = np.array([-direction[1], direction[0]])
+    # A side that bulges into the piece is farther inside than its chord.
+    near = (side[(along >= middle - half) & (along <= middle + half)] - place) @ normal
+    bulge = max(float(near.max(initial=0.0)), 0.0)
+    return Text(name, place + (bulge + inward * size) * normal, size, upright(direction))
+
+
+def add_angle(room: Labels, ends: FloatArray, angle: float) -> None:
+    """Place the dihedral angle of a fold, in degrees, along its line (2, 2), if there is room."""
+    text = f"{abs(np.degrees(angle)):.0f}\u00b0"
+    vector = ends[1] - ends[0]
+    length = float(np.linalg.norm(vector))
+    direction = vector / length
+    normal = np.array([-direction[1], direction[0]])
+    room.add(
+        Text(text, ends[0] + share * vector + shift * size * normal, size, upright(direction))
+        for size, shift, share in product(ANGLE_SIZES, (0.95, -0.95), (0.5, 0.35, 0.65))
+        if text_width(text, size) <= length
+    )
