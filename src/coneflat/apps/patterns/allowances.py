@@ -58,13 +58,20 @@ def widened(
         is_round: round corners instead of mitred ones.
 
     Notes:
-        The union of the piece, of a strip along each edge, and of a corner between two strips that turn apart.
+        The union of the piece, of a strip along each edge, and of a corner between two strips that turn apart. Pockets
+        that are enclosed by allowances which meet are filled.
     """
     parts = [polygon_of(rings)]
     for ring, width in zip(rings, widths, strict=True):
         parts += shapely().polygons([*_strips(ring, width)]).tolist() if width.any() else []
         parts += [shapely().Polygon(corner) for corner in _corners(ring, width, is_round)]
-    return united(parts)
+    union = united(parts)
+    is_hole = shapely().intersects(shapely().MultiPolygon([[ring, []] for ring in rings[1:]]), _filled(union.interiors))
+    return shapely().Polygon(union.exterior, np.array(union.interiors, dtype=object)[is_hole].tolist())
+
+
+def _filled(rings: Sequence[Any]) -> Any:
+    return np.array([shapely().Polygon(ring) for ring in rings], dtype=object)
 
 
 def _outward(ring: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from .drawing import Drawing
+from .guide import guide_pages
 from .pages import Page, tiled
 from .papers import Paper
 from .pattern import Pattern
@@ -16,5 +17,10 @@ def pattern_pages(pattern: Pattern, drawing: Drawing, paper: Paper, title: str) 
         drawing: its drawing.
         paper: the paper.
         title: text in the margins.
+
+    Raises:
+        OptionError: a page as large as the pattern would be larger than a PDF allows.
     """
-    return tiled(drawing, paper, title)
+    tiles = tiled(drawing, paper, title)
+    guide = guide_pages(pattern, drawing, paper, title)
+    return [*guide, *tiles] if paper.height is not None else [*tiles, *guide]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from io import StringIO
 from pathlib import Path
 from typing import Any
@@ -25,8 +27,9 @@ def write_dxf(drawing: Drawing, path: Path) -> None:
         OptionError: ezdxf is not installed.
         MeshFileError: the file cannot be written.
     """
-    stream = StringIO()
-    dxf_of(drawing).write(stream)
+    document, stream = dxf_of(drawing), StringIO()
+    with _without_times():
+        document.write(stream)
     with atomic_write(path, "w") as file:
         file.write(stream.getvalue())
 
@@ -38,8 +41,8 @@ def dxf_of(drawing: Drawing) -> Any:
         OptionError: ezdxf is not installed.
     """
     ezdxf = imported("ezdxf", "DXF files need ezdxf", '"coneflat[patterns]"')
-    ezdxf.options.write_fixed_meta_data_for_testing = True
-    document = ezdxf.new(VERSION, units=MILLIMETRES)
+    with _without_times():
+        document = ezdxf.new(VERSION, units=MILLIMETRES)
     document.header["$MEASUREMENT"] = 1
     for layer in LAYERS:
         document.layers.add(layer, color=PENS[layer].index, lineweight=round(100 * PENS[layer].width))
@@ -53,6 +56,19 @@ def dxf_of(drawing: Drawing) -> Any:
     document.header["$EXTMAX"] = (drawing.width, drawing.height, 0.0)
     document.set_modelspace_vport(height=drawing.height, center=(drawing.width / 2, drawing.height / 2))
     return document
+
+
+@contextmanager
+def _without_times() -> Iterator[None]:
+    """Let ezdxf write no times and random numbers."""
+    from ezdxf import options
+
+    before = options.write_fixed_meta_data_for_testing
+    options.write_fixed_meta_data_for_testing = True
+    try:
+        yield
+    finally:
+        options.write_fixed_meta_data_for_testing = before
 
 
 def _add_line(document: Any, space: Any, line: Line, names: dict[tuple[float, ...], str]) -> None:

@@ -1,4 +1,4 @@
-"""Places for texts: inside a piece, without covering one another."""
+"""Places for texts: inside a shape, without covering one another."""
 
 from __future__ import annotations
 
@@ -22,24 +22,24 @@ CHARACTER_WIDTH, LINE_HEIGHT = 0.84, 1.5
 
 @dataclass
 class Labels:
-    """Texts and marks of a piece.
+    """Texts and marks in a shape, such as a piece.
 
     Attributes:
-        piece: the shape inside which they must be.
+        shape: the shape inside which they must be.
         boxes: what is already covered.
         texts: the texts that have been placed.
     """
 
-    piece: Polygon
+    shape: Polygon
     boxes: list[Polygon] = field(default_factory=list)
     texts: list[Text] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        shapely().prepare(self.piece)
+        shapely().prepare(self.shape)
 
     def is_free(self, box: Polygon) -> bool:
-        """Return whether a shape is inside the piece and covers nothing."""
-        if not self.piece.contains(box):
+        """Return whether a shape is inside and covers nothing."""
+        if not self.shape.contains(box):
             return False
         return not self.boxes or not shapely().intersects(np.array(self.boxes), box).any()
 

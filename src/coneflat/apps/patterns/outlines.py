@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from ...base import IntArray
+from .allowances import shapely
 from .borders import Seam, Side
-from .drawing import Drawing, Line
+from .drawing import Drawing, Line, Text
 from .finish import HEM, SEWN, Finish
 from .labels import Labels
 from .notches import notches_of
@@ -32,21 +34,48 @@ def drawing_of(pattern: Pattern) -> Drawing:
     shapes = piece_shapes(pattern.surface, pattern.borders, finish, pattern.tabs)
     lines = [*_cut_lines(shapes), *_seam_lines(pattern, finish), *_tab_folds(pattern), *_folds(pattern)]
     lines += [*_notch_lines(pattern, finish), *_dart_tips(pattern)]
-    labels = [Labels(shape.inside) for shape in shapes]
-    for piece, room in enumerate(labels):
-        add_number(room, piece, shapes[piece].inside.area)
+    width, height = np.max([shape.cut.bounds[2:] for shape in shapes], axis=0)
+    rooms = Rooms.of(shapes, float(width), float(height))
+    for piece, room in enumerate(rooms.inside):
+        lines += add_number(room, rooms.outside, piece, shapes[piece].inside.area)
         if pattern.kind in SEWN:
             lines += add_grain(room)
     for seam in sorted(pattern.seams, key=lambda seam: -min(seam.lengths)):
         for side, partner in (seam.sides, seam.sides[::-1]):
             name = name_of_side(seam, side, partner)
-            add_seam_name(labels[side.piece], name, pattern.surface.points[side.points])
+            add_seam_name(rooms.at(side.piece), name, pattern.surface.points[side.points], finish.width(seam.name))
     piece_of_point = _piece_of_points(pattern)
     for ends, angle in zip(pattern.folds, pattern.fold_angles, strict=True):
-        add_angle(labels[piece_of_point[ends[0]]], pattern.surface.points[ends], float(angle))
-    width, height = np.max([shape.cut.bounds[2:] for shape in shapes], axis=0)
-    texts = tuple(text for room in labels for text in room.texts)
-    return Drawing(float(width), float(height), tuple(lines), texts)
+        add_angle(rooms.inside[piece_of_point[ends[0]]], pattern.surface.points[ends], float(angle))
+    return Drawing(float(width), float(height), tuple(lines), tuple(rooms.texts()))
+
+
+@dataclass(frozen=True, eq=False)
+class Rooms:
+    """Where texts may be: in the pieces, in their allowances and tabs, and outside."""
+
+    inside: list[Labels]
+    allowances: list[Labels]
+    outside: Labels
+
+    @classmethod
+    def of(cls, shapes: Sequence[PieceShape], width: float, height: float) -> Rooms:
+        """Return the rooms of pieces on a sheet of a width and height, mm."""
+        cut = [shape.cut for shape in shapes]
+        return cls(
+            [Labels(shape.inside) for shape in shapes],
+            [Labels(shapely().difference(shape.cut, shape.inside)) for shape in shapes],
+            Labels(shapely().difference(shapely().box(0, 0, width, height), shapely().union_all(cut))),
+        )
+
+    def at(self, piece: int) -> tuple[Labels, Labels, Labels]:
+        """Return the rooms at a piece."""
+        return self.inside[piece], self.allowances[piece], self.outside
+
+    def texts(self) -> Iterator[Text]:
+        """Yield all texts."""
+        for room in (*self.inside, *self.allowances, self.outside):
+            yield from room.texts
 
 
 def name_of_side(seam: Seam, side: Side, partner: Side) -> str:

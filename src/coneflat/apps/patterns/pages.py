@@ -13,7 +13,7 @@ from ...base import FloatArray
 from ...errors import OptionError
 from .allowances import shapely
 from .drawing import Drawing, Line, Text
-from .labels import box_of, text_width
+from .labels import box_of
 from .papers import IN_INCHES, LONGEST, MARGIN, Paper
 from .tiling import Tile, tiles_of
 
@@ -152,7 +152,7 @@ def ruler(low: FloatArray, paper: Paper) -> Drawing:
     """Return a ruler of 100 mm with its lower left end at a place, and for papers in inches one of 4 inches above."""
     lines, texts = _ruler(low, RULER, 1.0, f"{RULER} mm: measure this line after printing")
     if paper.name in IN_INCHES:
-        above = low + np.array([0.0, 2.5 * TICK])
+        above = low + np.array([0.0, 3 * TICK])
         more_lines, more_texts = _ruler(above, RULER_INCHES, INCH, f"{RULER_INCHES} inches")
         lines, texts = [*lines, *more_lines], [*texts, *more_texts]
     return Drawing(0.0, 0.0, tuple(lines), tuple(texts))
@@ -164,7 +164,7 @@ def _ruler(low: FloatArray, count: int, unit: float, name: str) -> tuple[list[Li
     for i in range(0, count + 1, step):
         tick = TICK if i % (2 * step) == 0 else TICK / 2
         lines.append(Line("mark", low + np.array([[i * unit, 0.0], [i * unit, tick]])))
-    place = low + np.array([count * unit + 2 + text_width(name, MARGIN_TEXT) / 2, TICK / 2])
+    place = low + np.array([count * unit / 2, TICK + MARGIN_TEXT])
     return lines, [Text(name, place, MARGIN_TEXT)]
 
 

@@ -29,12 +29,14 @@ class Tile:
         name: a letter for the row, from the top, and a number for the column.
         low, high: (2,) its lower left and its upper right corner on the sheet, mm.
         neighbours: the names of the tiles on the left, below, on the right and above; "" where there is none.
+        overlaps: whether neighbouring tiles overlap by OVERLAP.
     """
 
     name: str
     low: FloatArray
     high: FloatArray
-    neighbours: tuple[str, str, str, str] = ("", "", "", "")
+    neighbours: tuple[str, str, str, str]
+    overlaps: bool
 
 
 def tiles_of(shapes: Sequence[Polygon], width: float, height: float, paper: Paper) -> list[Tile]:
@@ -81,6 +83,7 @@ def _tiles(
             low,
             low + size,
             (name(row, column - 1), name(row + 1, column), name(row, column + 1), name(row - 1, column)),
+            overlap > 0,
         )
         for (row, column), low in corners.items()
         if (row, column) in covered

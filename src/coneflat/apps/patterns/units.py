@@ -90,3 +90,9 @@ def text_of_size(extents: Any) -> str:
     longest = max(extents)
     unit, factor = ("m", 1000.0) if longest >= 10_000 else ("mm", 1.0)
     return " x ".join(f"{extent / factor:.3g}" for extent in extents) + f" {unit}"
+
+
+def area_text(area: float) -> str:
+    """Return an area in mm^2 as a text in square centimetres, with three digits or more."""
+    centimetres = area / 100
+    return f"{centimetres:.0f} cm\u00b2" if centimetres >= 100 else f"{centimetres:.3g} cm\u00b2"
