@@ -47,9 +47,7 @@ def united(shapes: Sequence[Any]) -> Polygon:
     return max(parts, key=lambda part: part.area)
 
 
-def widened(
-    rings: Sequence[FloatArray], widths: Sequence[FloatArray], is_round: bool = False
-) -> Polygon:
+def widened(rings: Sequence[FloatArray], widths: Sequence[FloatArray], is_round: bool = False) -> Polygon:
     """Return a piece with seam allowances.
 
     Args:
@@ -66,7 +64,9 @@ def widened(
         parts += shapely().polygons([*_strips(ring, width)]).tolist() if width.any() else []
         parts += [shapely().Polygon(corner) for corner in _corners(ring, width, is_round)]
     union = united(parts)
-    is_hole = shapely().intersects(shapely().MultiPolygon([[ring, []] for ring in rings[1:]]), _filled(union.interiors))
+    is_hole = shapely().intersects(
+        shapely().MultiPolygon([[ring, []] for ring in rings[1:]]), _filled(union.interiors)
+    )
     return shapely().Polygon(union.exterior, np.array(union.interiors, dtype=object)[is_hole].tolist())
 
 
@@ -118,9 +118,7 @@ def _arc(first: FloatArray, second: FloatArray, turn: float) -> list[FloatArray]
     ]
 
 
-def _mitre(
-    first: FloatArray, second: FloatArray, before: FloatArray, after: FloatArray
-) -> list[FloatArray]:
+def _mitre(first: FloatArray, second: FloatArray, before: FloatArray, after: FloatArray) -> list[FloatArray]:
     """Return the points between the ends of two allowances: where the offset edges meet, or a trimmed corner."""
     limit = MITRE_LIMIT * max(float(np.linalg.norm(first)), float(np.linalg.norm(second)))
     turn = before[0] * after[1] - before[1] * after[0]

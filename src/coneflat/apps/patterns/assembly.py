@@ -6,7 +6,7 @@ from .drawing import Drawing
 from .guide import guide_pages
 from .pages import Page, tiled
 from .papers import Paper
-from .pattern import Pattern
+from .result import Pattern
 
 
 def pattern_pages(pattern: Pattern, drawing: Drawing, paper: Paper, title: str) -> list[Page]:

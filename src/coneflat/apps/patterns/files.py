@@ -9,8 +9,8 @@ from ...io import checked_target
 from .assembly import pattern_pages
 from .dxf import write_dxf
 from .papers import Paper
-from .pattern import Pattern
 from .pdf import write_pdf
+from .result import Pattern
 from .svg import write_svg
 
 #: The endings of files for patterns.

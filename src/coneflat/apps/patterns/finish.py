@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, ClassVar
 
 from ...base import list_some, short_repr
 from ...errors import OptionError
+from ...options import Kind
 from .units import length_of
 
 #: Kinds of patterns whose pieces are sewn: they get seam allowances, notches and a grain line.
@@ -55,6 +56,19 @@ class Finish:
                     f"seam_allowances names the seam {name}, which the pattern does not have: its seams are "
                     f"{list_some(names) or 'none'}; {HEM} stands for the other sides"
                 )
+
+
+@dataclass(frozen=True)
+class Allowances(Kind):
+    """Widths of seam allowances by name, as a text such as "A=10mm,B=0"."""
+
+    metavar: ClassVar[str] = "NAME=LENGTH,..."
+
+    def parse(self, name: str, value: Any) -> str:
+        if not isinstance(value, str):
+            raise OptionError(f"{name} must be a text such as A=10mm,B=0, got {short_repr(value)}")
+        read_allowances(value)
+        return value
 
 
 def read_allowances(text: str) -> dict[str, float]:

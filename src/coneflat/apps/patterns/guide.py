@@ -8,12 +8,12 @@ from collections.abc import Iterator
 import numpy as np
 
 from ...base import FloatArray, plural
-from .drawing import Drawing, Line, Text
+from .drawing import Drawing, Text
 from .finish import SEWN, Finish
 from .pages import Page, Picture, cut_shapes, page_map, ruler
 from .papers import IN_INCHES, MARGIN, OVERLAP, Paper
-from .pattern import Pattern
 from .report import piece_sizes
+from .result import Pattern
 from .tables import Table, laid_out
 from .tiling import tiles_of
 from .units import area_text, text_of_size
@@ -61,7 +61,9 @@ def _overview(pattern: Pattern, drawing: Drawing, paper: Paper, own_paper: Paper
     pictures, numbers = _pictures(pattern, width, PICTURES * height, top)
     texts += numbers
     top -= PICTURES * height + SPACE
-    about = [*_lines_of_text([*_how_to_read(pattern), *_how_to_join(drawing, paper), *pattern.notes], width, top)]
+    about = [
+        *_lines_of_text([*_how_to_read(pattern), *_how_to_join(drawing, paper), *pattern.notes], width, top)
+    ]
     texts += about
     top = min(float(text.place[1]) for text in about) - SPACE
     rulers = ruler(np.array([MARGIN, MARGIN]), own_paper)
@@ -74,15 +76,14 @@ def _overview(pattern: Pattern, drawing: Drawing, paper: Paper, own_paper: Paper
     return Page(page, pictures=tuple(pictures))
 
 
-def _pictures(
-    pattern: Pattern, width: float, height: float, top: float
-) -> tuple[list[Picture], list[Text]]:
+def _pictures(pattern: Pattern, width: float, height: float, top: float) -> tuple[list[Picture], list[Text]]:
     """Return the pictures of the model and of its pieces moved apart, with their numbers."""
     axis = pattern.settings.get("axis")
     eye, up = eye_and_up(pattern.surface, None if axis is None else np.asarray(axis))
     each = (width - SPACE) / 2
     pixels = round(PIXELS * each), round(PIXELS * height)
-    pictures, texts = [], []
+    pictures: list[Picture] = []
+    texts: list[Text] = []
     for i, apart in enumerate((False, True)):
         low = np.array([MARGIN + i * (each + SPACE), top - height])
         view = view_of(pattern.surface, pixels, eye, up, apart)
@@ -105,9 +106,12 @@ def _summary(pattern: Pattern) -> list[str]:
     strain = float(np.abs(pattern.strains).max())
     stretched = f"; lengths change by at most {100 * strain:.2g} %" if strain > 1e-6 else ""
     finish = Finish.of(pattern.kind, pattern.settings)
-    allowance = f"seam allowance {finish.allowance:g} mm, included" if finish.allowance else "no seam allowance"
+    allowance = (
+        f"seam allowance {finish.allowance:g} mm, included" if finish.allowance else "no seam allowance"
+    )
     return [
-        f"{pattern.kind}: {plural(pattern.piece_count, 'piece')}, {seams}{darts}; finished size {text_of_size(extents)}",
+        f"{pattern.kind}: {plural(pattern.piece_count, 'piece')}, {seams}{darts}; "
+        f"finished size {text_of_size(extents)}",
         f"{allowance}{stretched}",
     ]
 
@@ -179,10 +183,17 @@ def _pages_of_pieces(pattern: Pattern, drawing: Drawing, paper: Paper) -> list[s
 def _seam_tables(pattern: Pattern) -> Iterator[Table]:
     if not pattern.seams:
         return
-    rows = []
+    rows, has_ease = [], any(seam.is_eased for seam in pattern.seams)
     for seam in pattern.seams:
         first, second = (side.piece + 1 for side in seam.sides)
-        pieces = f"dart in {first}" if seam.is_dart else f"{first} and {second}" if first != second else f"{first}, itself"
+        pieces = (
+            f"dart in {first}"
+            if seam.is_dart
+            else f"{first} and {second}"
+            if first != second
+            else f"{first}, itself"
+        )
         ease = f"{seam.ease:.1f}" if seam.is_eased else ""
-        rows.append((seam.name, pieces, f"{max(seam.lengths):.1f}", ease))
-    yield Table("Seams", ("name", "pieces", "length, mm", "ease, mm"), tuple(rows))
+        rows.append((seam.name, pieces, f"{max(seam.lengths):.1f}", *([ease] if has_ease else [])))
+    columns = "name", "pieces", "length, mm", *(["ease, mm"] if has_ease else [])
+    yield Table("Seams", columns, tuple(rows))

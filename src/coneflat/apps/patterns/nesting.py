@@ -17,7 +17,7 @@ from .cut_surface import CutSurface
 from .finish import SEWN, Finish
 from .labels import rotated
 from .papers import OVERLAP, Paper
-from .pattern import Pattern
+from .result import Pattern
 from .shapes import PieceShape, piece_shapes
 from .tiling import tiles_of
 
@@ -112,7 +112,8 @@ def _angles(shapes: Sequence[PieceShape], has_grain: bool) -> FloatArray:
         return np.tile([0.0, np.pi], (len(shapes), 1))
     turns = 4 * min(max(MAX_PLACEMENTS // (4 * len(shapes)), 1), TURNS // 4)
     straight = [
-        straight_angle(ring[:, 0] + 1j * ring[:, 1], np.empty(0)) for ring in (shape.cut_rings[0] for shape in shapes)
+        straight_angle(ring[:, 0] + 1j * ring[:, 1], np.empty(0))
+        for ring in (shape.cut_rings[0] for shape in shapes)
     ]
     return np.array(straight)[:, None] + 2 * np.pi / turns * np.arange(turns)
 
@@ -120,7 +121,12 @@ def _angles(shapes: Sequence[PieceShape], has_grain: bool) -> FloatArray:
 def _placed(pieces: _Pieces, shapes: Sequence[PieceShape], paper: Paper) -> SheetPacking:
     if paper.width is not None and paper.height is not None:
         whole = pack_sheets(
-            pieces.outlines, pieces.angles, GAP, paper.inner_width, paper.inner_height, _columns(paper.inner_width)
+            pieces.outlines,
+            pieces.angles,
+            GAP,
+            paper.inner_width,
+            paper.inner_height,
+            _columns(paper.inner_width),
         )
         return _fewest_pages(pieces, shapes, paper) if whole is None else _pages_in_rows(whole, paper)
     if paper.width is not None:
@@ -148,7 +154,7 @@ def _fewest_pages(pieces: _Pieces, shapes: Sequence[PieceShape], paper: Paper) -
     step = paper.inner_width - OVERLAP
     least = max(int(np.ceil((1.01 * pieces.narrowest - OVERLAP) / step)), 1)
     area = sum(shape.cut.area for shape in shapes)
-    square = max(int(round((1.2 * area) ** 0.5 / step)), least)
+    square = max(round((1.2 * area) ** 0.5 / step), least)
     counts = range(max(least, square - MORE_COLUMNS), square + MORE_COLUMNS + 1)
     candidates = [packing for _, packing in _strips(pieces, [count * step + OVERLAP for count in counts])]
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...base import FloatArray
+from ...base import FloatArray, IntArray
 from .borders import Seam
 
 # Shortest seam with a notch, distance of notches, mm, and their largest number along a seam.
@@ -69,13 +69,13 @@ def distances(line: FloatArray) -> FloatArray:
     return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
 
 
-def _places(along: FloatArray, targets: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _places(along: FloatArray, targets: FloatArray) -> tuple[IntArray, FloatArray]:
     """Return the edges in which targets lie, and how far along them, from 0 to 1."""
     edge = np.clip(np.searchsorted(along, targets, side="right") - 1, 0, len(along) - 2)
     return edge, (targets - along[edge]) / (along[edge + 1] - along[edge])
 
 
-def _notches(line: FloatArray, edge: FloatArray, part: FloatArray) -> Iterator[Notch]:
+def _notches(line: FloatArray, edge: IntArray, part: FloatArray) -> Iterator[Notch]:
     for i, (e, share) in enumerate(zip(edge.tolist(), part.tolist(), strict=True)):
         tail, head = line[e], line[e + 1]
         along = (head - tail) / np.linalg.norm(head - tail)

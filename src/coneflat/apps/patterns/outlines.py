@@ -14,8 +14,8 @@ from .drawing import Drawing, Line, Text
 from .finish import HEM, SEWN, Finish
 from .labels import Labels
 from .notches import notches_of
-from .pattern import Pattern
 from .piece_texts import add_angle, add_grain, add_number, add_seam_name
+from .result import Pattern
 from .shapes import PieceShape, piece_shapes
 
 # Dashes and gaps, mm: seam lines, folds away from the eye (mountains) and towards it (valleys).
@@ -43,7 +43,9 @@ def drawing_of(pattern: Pattern) -> Drawing:
     for seam in sorted(pattern.seams, key=lambda seam: -min(seam.lengths)):
         for side, partner in (seam.sides, seam.sides[::-1]):
             name = name_of_side(seam, side, partner)
-            add_seam_name(rooms.at(side.piece), name, pattern.surface.points[side.points], finish.width(seam.name))
+            add_seam_name(
+                rooms.at(side.piece), name, pattern.surface.points[side.points], finish.width(seam.name)
+            )
     piece_of_point = _piece_of_points(pattern)
     for ends, angle in zip(pattern.folds, pattern.fold_angles, strict=True):
         add_angle(rooms.inside[piece_of_point[ends[0]]], pattern.surface.points[ends], float(angle))

@@ -88,7 +88,9 @@ def tiled(drawing: Drawing, paper: Paper, title: str) -> list[Page]:
 
 def cut_shapes(drawing: Drawing) -> list[Polygon]:
     """Return the polygons of the closed lines on the layer cut."""
-    return [shapely().Polygon(line.points) for line in drawing.lines if line.layer == "cut" and line.is_closed]
+    return [
+        shapely().Polygon(line.points) for line in drawing.lines if line.layer == "cut" and line.is_closed
+    ]
 
 
 def _page(drawing: Drawing, tile: Tile, paper: Paper, count: int, title: str) -> Page:
@@ -122,7 +124,12 @@ def _visible(drawing: Drawing, tile: Tile) -> Drawing:
 
 def _crop_marks(low: FloatArray, high: FloatArray) -> Iterator[Line]:
     """Yield lines in the margins that show where a page is cut, and crosses where pages that overlap meet."""
-    for corner, away in ((low, (-1, -1)), (high, (1, 1)), ((high[0], low[1]), (1, -1)), ((low[0], high[1]), (-1, 1))):
+    for corner, away in (
+        (low, (-1, -1)),
+        (high, (1, 1)),
+        ((high[0], low[1]), (1, -1)),
+        ((low[0], high[1]), (-1, 1)),
+    ):
         for axis in (0, 1):
             arm = np.zeros(2)
             arm[axis] = away[axis]

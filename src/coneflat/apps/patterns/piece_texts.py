@@ -45,7 +45,12 @@ def add_number(room: Labels, outside: Labels, piece: int, area: float) -> Iterat
     if np.hypot(step, text_width(details, below) / 2) <= radius:
         room.add([Text(number, centre + np.array([0.0, 0.4 * step]), size)])
         room.add([Text(details, centre - np.array([0.0, 0.7 * step]), below)])
-    elif room.add([Text(number, centre, size * factor) for factor in (1.0, 0.75, 0.5) if size * factor >= MIN_TEXT]) is None:
+    elif (
+        room.add(
+            [Text(number, centre, size * factor) for factor in (1.0, 0.75, 0.5) if size * factor >= MIN_TEXT]
+        )
+        is None
+    ):
         text = outside.add(
             Text(number, centre + (radius + distance) * direction, OUTSIDE_NUMBER)
             for distance, direction in product(OUTSIDE_DISTANCES, _directions())

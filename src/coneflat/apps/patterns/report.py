@@ -9,7 +9,7 @@ import numpy as np
 from .allowances import shapely
 from .finish import Finish
 from .papers import Paper
-from .pattern import Pattern
+from .result import Pattern
 from .shapes import piece_shapes
 from .tiling import tiles_of
 

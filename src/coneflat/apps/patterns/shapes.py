@@ -53,9 +53,7 @@ class PieceShape:
         """The lines (k, 2) along which it is cut, without repeated ends."""
         if not self.is_wider:
             return self.seam_rings
-        return tuple(
-            np.asarray(ring.coords)[:-1] for ring in (self.cut.exterior, *self.cut.interiors)
-        )
+        return tuple(np.asarray(ring.coords)[:-1] for ring in (self.cut.exterior, *self.cut.interiors))
 
 
 def piece_shapes(

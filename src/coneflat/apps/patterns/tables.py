@@ -40,7 +40,9 @@ class Table:
         ]
 
 
-def laid_out(tables: Sequence[Table], low: FloatArray, high: FloatArray) -> list[tuple[list[Line], list[Text]]]:
+def laid_out(
+    tables: Sequence[Table], low: FloatArray, high: FloatArray
+) -> list[tuple[list[Line], list[Text]]]:
     """Return the lines and texts of tables on as many pages as they need, in columns from the left.
 
     Args:
@@ -70,7 +72,12 @@ def laid_out(tables: Sequence[Table], low: FloatArray, high: FloatArray) -> list
 
 
 def _draw(
-    table: Table, rows: Sequence[tuple[str, ...]], left: float, top: float, lines: list[Line], texts: list[Text]
+    table: Table,
+    rows: Sequence[tuple[str, ...]],
+    left: float,
+    top: float,
+    lines: list[Line],
+    texts: list[Text],
 ) -> float:
     """Draw a part of a table, and return its lower end."""
     widths = table.widths
@@ -88,4 +95,6 @@ def _draw(
 
 
 def _row(cells: Sequence[str], middle: FloatArray, y: float) -> Iterator[Text]:
-    return (Text(cell, np.array([x, y]), SIZE) for cell, x in zip(cells, middle.tolist(), strict=True) if cell)
+    return (
+        Text(cell, np.array([x, y]), SIZE) for cell, x in zip(cells, middle.tolist(), strict=True) if cell
+    )

@@ -62,7 +62,10 @@ def _tiles(
     shapes: Sequence[Polygon], width: float, height: float, size: FloatArray, overlap: float
 ) -> list[Tile]:
     step = size - overlap
-    counts = [max(ceil((extent - overlap) / pitch - ROUNDING), 1) for extent, pitch in zip((width, height), step, strict=True)]
+    counts = [
+        max(ceil((extent - overlap) / pitch - ROUNDING), 1)
+        for extent, pitch in zip((width, height), step, strict=True)
+    ]
     corners = {
         (row, column): np.array([column * step[0], (counts[1] - 1 - row) * step[1]])
         for row in range(counts[1])
@@ -71,7 +74,8 @@ def _tiles(
     covered = {
         place
         for place, low in corners.items()
-        if shapely().area(shapely().intersection(np.array(shapes), shapely().box(*low, *(low + size)))).max() > ROUNDING
+        if shapely().area(shapely().intersection(np.array(shapes), shapely().box(*low, *(low + size)))).max()
+        > ROUNDING
     }
 
     def name(row: int, column: int) -> str:
@@ -95,7 +99,7 @@ def _are_whole(shapes: Sequence[Polygon], tiles: Sequence[Tile]) -> bool:
     bounds = shapely().bounds(np.array(shapes))
     is_inside = np.zeros(len(bounds), dtype=bool)
     for tile in tiles:
-        is_inside |= (bounds[:, :2] >= tile.low - ROUNDING).all(axis=1) & (bounds[:, 2:] <= tile.high + ROUNDING).all(axis=1)
+        is_inside |= (bounds[:, :2] >= tile.low - ROUNDING).all(axis=1) & (
+            bounds[:, 2:] <= tile.high + ROUNDING
+        ).all(axis=1)
     return bool(is_inside.all())
-
-

@@ -14,6 +14,8 @@ from ...geometry import fill_nearest, unit_vectors
 from ..view import eye_direction, upward_axis
 from .cut_surface import CutSurface
 
+# Directions from which the model may be seen, the first one preferred, and the size of the pictures that are compared.
+EYES, TRIAL = ("front-right", "front-left", "back-right", "back-left"), (200, 200)
 # Distance of the eye from the centre, in radii of the model.
 EYE_DISTANCE = 4.0
 # How far pieces are moved apart, in radii of the model.
@@ -41,14 +43,19 @@ class View:
 
 
 def eye_and_up(surface: CutSurface, axis: FloatArray | None) -> tuple[FloatArray, FloatArray]:
-    """Return the direction to the eye, from front and right above, and the upward direction of a model.
+    """Return the direction to the eye that shows most pieces, obliquely from above, and the upward direction.
 
-    axis: (3,) the upward direction; None for the axis that probably points up.
+    axis: (3,) the upward direction of the model; None for the axis that probably points up.
     """
     mesh = surface.mesh
     name = upward_axis(mesh.vertices, mesh.faces) if axis is None else "xyz"[int(np.abs(axis).argmax())]
     upward = np.eye(3)["xyz".index(name)] if axis is None else np.asarray(axis, dtype=np.float64)
-    return unit_vectors(eye_direction("front-right", name)[None])[0], upward / np.linalg.norm(upward)
+    upward = upward / np.linalg.norm(upward)
+    eyes = unit_vectors(np.array([eye_direction(words, name) for words in EYES]))
+    if axis is not None and axis["xyz".index(name)] < 0:
+        eyes -= 2 * (eyes @ upward).clip(max=0)[:, None] * upward  # from above
+    shown = [len(view_of(surface, TRIAL, eye, upward).numbers) for eye in eyes]
+    return eyes[int(np.argmax(shown))], upward
 
 
 def view_of(
@@ -92,7 +99,8 @@ def _apart(surface: CutSurface, distance: float) -> tuple[FloatArray, IntArray]:
     corners = mesh.vertices[mesh.faces]
     areas = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     count = int(surface.pieces.max()) + 1
-    normals = np.stack([np.bincount(surface.pieces, column, count) for column in areas.T], axis=1)
+    normals = np.zeros((count, 3))
+    np.add.at(normals, surface.pieces, areas)
     moves = distance * radius * unit_vectors(normals)
     vertices = np.empty((len(surface.points), 3))
     vertices[surface.corners] = corners + moves[surface.pieces][:, None]
@@ -106,7 +114,7 @@ def _projected(vertices: FloatArray, eye: FloatArray, up: FloatArray, width: int
         right = np.cross(np.roll(up, 1), eye)
     right = right / np.linalg.norm(right)
     middle = (vertices.min(axis=0) + vertices.max(axis=0)) / 2
-    x, y, z = (np.stack([right, np.cross(eye, right), eye]) @ (vertices - middle).T)
+    x, y, z = np.stack([right, np.cross(eye, right), eye]) @ (vertices - middle).T
     radius = float(np.sqrt(x**2 + y**2 + z**2).max())
     nearness = radius / (EYE_DISTANCE * radius - z)
     flat = np.stack([x * nearness, y * nearness], axis=1)
