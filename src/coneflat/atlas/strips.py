@@ -47,7 +47,12 @@ class _Try(NamedTuple):
 
 
 def pack_strip(
-    outlines: Outlines, angles: FloatArray, gap: float, width: float, columns: int = COLUMNS
+    outlines: Outlines,
+    angles: FloatArray,
+    gap: float,
+    width: float,
+    columns: int = COLUMNS,
+    tries: int = TRIES,
 ) -> SheetPacking | None:
     """Return outlines packed on a strip of a width, as short as possible; None if an outline is too wide for it.
 
@@ -57,6 +62,7 @@ def pack_strip(
         gap: minimum distance between outlines.
         width: width of the strip.
         columns: columns of the grid across the width, whose cells outlines do not share.
+        tries: number of random changes that are tried.
     """
     grid = _Grid.of(outlines, angles, gap, width, columns)
     if not grid.fits(width):
@@ -65,7 +71,7 @@ def pack_strip(
     heights = grid.masks.size[:, 1].reshape(angles.shape)
     rows = int(heights.max(axis=1).sum()) + (len(outlines) + 1) * len(grid.reach)
     rng, best = np.random.default_rng(0), grid.place(grid.first_plan, 1, rows)
-    for _ in range(TRIES if best.rows <= rows and len(outlines) > 1 else 0):
+    for _ in range(tries if best.rows <= rows and len(outlines) > 1 else 0):
         if grid.work > MAX_WORK:
             break
         begin_step()

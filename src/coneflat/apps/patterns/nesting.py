@@ -16,7 +16,7 @@ from .allowances import shapely
 from .cut_surface import CutSurface
 from .finish import SEWN, Finish
 from .labels import rotated
-from .papers import OVERLAP, Paper
+from .papers import EDGE, OVERLAP, Paper
 from .result import Pattern
 from .shapes import PieceShape, piece_shapes
 from .tiling import tiles_of
@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 
 # Distance of what is cut out, mm.
 GAP = 3.0
+# Random changes of the plan of a sheet that are tried, for all its widths together.
+TRIES = 150
 # Widest cell of the grid on which pieces are placed, mm, and smallest number of cells across a sheet.
 CELL, MIN_COLUMNS = 1.0, 400
 # Widths of a sheet without a given one, relative to the square root of the area of the pieces.
@@ -70,7 +72,7 @@ def nested(pattern: Pattern) -> Pattern:
         pattern.surface, pattern.borders, Finish.of(pattern.kind, pattern.settings), pattern.tabs
     )
     pieces = _Pieces(_outlines(shapes), _angles(shapes, pattern.kind in SEWN))
-    return _moved(pattern, _placed(pieces, shapes, paper))
+    return _moved(pattern, _packed(pieces, shapes, paper))
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,9 +90,21 @@ class _Pieces:
         widths = np.maximum.reduceat(turned, start) - np.minimum.reduceat(turned, start)
         return float(widths.min(axis=1).max())
 
-    def strip(self, width: float) -> SheetPacking | None:
+    def strip(self, width: float, tries: int = TRIES) -> SheetPacking | None:
         """Return the pieces on a strip of a width; None if one is wider."""
-        return pack_strip(self.outlines, self.angles, GAP, width, _columns(width))
+        inner = width - 2 * EDGE
+        packing = pack_strip(self.outlines, self.angles, GAP, inner, _columns(inner), tries)
+        return None if packing is None else _inset(packing)
+
+    def pages(self, paper: Paper) -> SheetPacking | None:
+        """Return the pieces on the fewest pages; None if one is larger than a page."""
+        width, height = paper.inner_width - 2 * EDGE, paper.inner_height - 2 * EDGE
+        packing = pack_sheets(self.outlines, self.angles, GAP, width, height, _columns(width))
+        return None if packing is None else _inset(packing)
+
+
+def _inset(packing: SheetPacking) -> SheetPacking:
+    return replace(packing, shift=packing.shift + EDGE * (1 + 1j))
 
 
 def _columns(width: float) -> int:
@@ -118,23 +132,16 @@ def _angles(shapes: Sequence[PieceShape], has_grain: bool) -> FloatArray:
     return np.array(straight)[:, None] + 2 * np.pi / turns * np.arange(turns)
 
 
-def _placed(pieces: _Pieces, shapes: Sequence[PieceShape], paper: Paper) -> SheetPacking:
+def _packed(pieces: _Pieces, shapes: Sequence[PieceShape], paper: Paper) -> SheetPacking:
     if paper.width is not None and paper.height is not None:
-        whole = pack_sheets(
-            pieces.outlines,
-            pieces.angles,
-            GAP,
-            paper.inner_width,
-            paper.inner_height,
-            _columns(paper.inner_width),
-        )
+        whole = pieces.pages(paper)
         return _fewest_pages(pieces, shapes, paper) if whole is None else _pages_in_rows(whole, paper)
     if paper.width is not None:
         packing = pieces.strip(paper.inner_width)
         if packing is None:
             raise OptionError(
-                f"a piece is {pieces.narrowest:.0f} mm wide and the roll {paper.inner_width:.0f} mm without its "
-                "margins: choose a wider roll, a page size, a smaller height, or a smaller strain for smaller pieces"
+                f"a piece is {pieces.narrowest:.0f} mm wide and the roll {paper.inner_width - 2 * EDGE:.0f} mm "
+                "without its margins: choose a wider roll, a page size, or a smaller height"
             )
         return packing
     area = sum(shape.cut.area for shape in shapes)
@@ -144,7 +151,7 @@ def _placed(pieces: _Pieces, shapes: Sequence[PieceShape], paper: Paper) -> Shee
 
 def _strips(pieces: _Pieces, widths: Sequence[float]) -> Iterator[tuple[float, SheetPacking]]:
     for width in widths:
-        packing = pieces.strip(width)
+        packing = pieces.strip(width, TRIES // len(widths))
         if packing is not None:
             yield width, packing
 
@@ -152,7 +159,7 @@ def _strips(pieces: _Pieces, widths: Sequence[float]) -> Iterator[tuple[float, S
 def _fewest_pages(pieces: _Pieces, shapes: Sequence[PieceShape], paper: Paper) -> SheetPacking:
     """Return the pieces on a sheet of pages that overlap, of the width for which there are fewest pages."""
     step = paper.inner_width - OVERLAP
-    least = max(int(np.ceil((1.01 * pieces.narrowest - OVERLAP) / step)), 1)
+    least = max(int(np.ceil((1.01 * pieces.narrowest + 2 * EDGE - OVERLAP) / step)), 1)
     area = sum(shape.cut.area for shape in shapes)
     square = max(round((1.2 * area) ** 0.5 / step), least)
     counts = range(max(least, square - MORE_COLUMNS), square + MORE_COLUMNS + 1)
@@ -160,7 +167,7 @@ def _fewest_pages(pieces: _Pieces, shapes: Sequence[PieceShape], paper: Paper) -
 
     def cost(packing: SheetPacking) -> tuple[int, float]:
         cut = _cut_out(shapes, packing)
-        width, height = shapely().total_bounds(cut)[2:]
+        width, height = shapely().total_bounds(cut)[2:] + EDGE
         return len(tiles_of(cut, width, height, paper)), width * height
 
     return min(candidates, key=cost)
@@ -197,5 +204,5 @@ def _moved(pattern: Pattern, packing: SheetPacking) -> Pattern:
     for piece in range(pattern.piece_count):
         members = np.unique(surface.corners[surface.pieces == piece])
         points[members] = _placed_points(points[members], packing, piece)
-    tabs = tuple(replace(tab, points=_placed_points(tab.points, packing, tab.piece)) for tab in pattern.tabs)
+    tabs = tuple(replace(tab, polygon=_placed_points(tab.polygon, packing, tab.piece)) for tab in pattern.tabs)
     return replace(pattern, surface=replace(surface, points=points), tabs=tabs)

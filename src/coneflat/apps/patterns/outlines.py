@@ -14,6 +14,7 @@ from .drawing import Drawing, Line, Text
 from .finish import HEM, SEWN, Finish
 from .labels import Labels
 from .notches import notches_of
+from .papers import EDGE
 from .piece_texts import add_angle, add_grain, add_number, add_seam_name
 from .result import Pattern
 from .shapes import PieceShape, piece_shapes
@@ -34,7 +35,7 @@ def drawing_of(pattern: Pattern) -> Drawing:
     shapes = piece_shapes(pattern.surface, pattern.borders, finish, pattern.tabs)
     lines = [*_cut_lines(shapes), *_seam_lines(pattern, finish), *_tab_folds(pattern), *_folds(pattern)]
     lines += [*_notch_lines(pattern, finish), *_dart_tips(pattern)]
-    width, height = np.max([shape.cut.bounds[2:] for shape in shapes], axis=0)
+    width, height = np.max([shape.cut.bounds[2:] for shape in shapes], axis=0) + EDGE
     rooms = Rooms.of(shapes, float(width), float(height))
     for piece, room in enumerate(rooms.inside):
         lines += add_number(room, rooms.outside, piece, shapes[piece].inside.area)
@@ -103,7 +104,7 @@ def _seam_lines(pattern: Pattern, finish: Finish) -> Iterator[Line]:
 
 
 def _tab_folds(pattern: Pattern) -> Iterator[Line]:
-    return (Line("fold", tab.points[[0, -1]], dashes=MOUNTAIN) for tab in pattern.tabs)
+    return (Line("fold", tab.polygon[[0, -1]], dashes=MOUNTAIN) for tab in pattern.tabs)
 
 
 def _folds(pattern: Pattern) -> Iterator[Line]:

@@ -101,7 +101,7 @@ def _page(drawing: Drawing, tile: Tile, paper: Paper, count: int, title: str) ->
     lines: list[Line] = []
     name = f"{title}   page {tile.name} of {count}" if count > 1 else title
     texts = [Text(name, np.array([width / 2, MARGIN / 2]), MARGIN_TEXT)]
-    if count > 1:
+    if tile.overlaps and count > 1:
         lines += _crop_marks(low, low + size)
         texts += _neighbours(tile, low, low + size)
     if paper.height is None:

@@ -27,6 +27,8 @@ PAGE_SIZES: Mapping[str, tuple[float, float]] = {
 IN_INCHES = ("letter", "legal", "tabloid")
 #: The border of a page that is not printed on, and how far neighbouring pages overlap, mm.
 MARGIN, OVERLAP = 10.0, 10.0
+#: Distance of pieces from the border of a sheet or of the printed part of a page, so that no line is on it, mm.
+EDGE = 1.0
 #: The longest side of a page of a PDF, mm: 14,400 points.
 LONGEST = 5080.0
 _ROLL = "roll:"

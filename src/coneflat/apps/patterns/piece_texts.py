@@ -24,8 +24,10 @@ OUTSIDE_NUMBER, OUTSIDE_DISTANCES = 2.0, tuple(range(3, 40, 2))
 # Places along a side, as fractions of its length, and distances from it relative to the text, in the order in which
 # they are tried for its name.
 ALONG, INWARD = (0.5, 0.42, 0.58, 0.33, 0.67, 0.22, 0.78, 0.12, 0.88), (1.1, 1.6)
-# Longest grain line, length of the arms of its arrows, mm, and the fraction of the piece that it takes.
-MAX_GRAIN, ARROW, GRAIN_SHARE, MIN_GRAIN = 120.0, 3.0, 0.7, 10.0
+# Longest and shortest grain line, and length of the arms of its arrows, mm; lengths and places of its middle that are
+# tried, as fractions of the length of the piece there.
+MAX_GRAIN, MIN_GRAIN, ARROW = 120.0, 10.0, 3.0
+GRAINS = ((0.7, 0.5), (0.35, 0.5), (0.3, 0.75), (0.3, 0.25), (0.15, 0.8), (0.15, 0.2))
 # Accuracy of the centre of a piece, relative to the size of the piece.
 CENTRE_ACCURACY = 0.01
 
@@ -47,7 +49,11 @@ def add_number(room: Labels, outside: Labels, piece: int, area: float) -> Iterat
         room.add([Text(details, centre - np.array([0.0, 0.7 * step]), below)])
     elif (
         room.add(
-            [Text(number, centre, size * factor) for factor in (1.0, 0.75, 0.5) if size * factor >= MIN_TEXT]
+            [
+                Text(number, centre, size * factor)
+                for factor in (1.6, 1.2, 1.0, 0.75, 0.5)
+                if size * factor >= MIN_TEXT
+            ]
         )
         is None
     ):
@@ -72,11 +78,11 @@ def add_grain(room: Labels) -> Iterator[Line]:
     columns = low + (high - low) * (np.arange(25) + 0.5) / 25
     chords = [chord for x in columns.tolist() for chord in _chords(room, x)]
     for x, bottom, top in sorted(chords, key=lambda chord: (round(chord[1] - chord[2], 3), chord[0])):
-        for share in (GRAIN_SHARE, GRAIN_SHARE / 2):
+        for share, at in GRAINS:
             half = min(share * (top - bottom), MAX_GRAIN) / 2
             if 2 * half < MIN_GRAIN:
-                return
-            middle = (top + bottom) / 2
+                continue
+            middle = bottom + at * (top - bottom)
             ends = np.array([[x, middle - half], [x, middle + half]])
             box = shapely().box(x - ARROW / 2 - 1, middle - half - 1, x + ARROW / 2 + 1, middle + half + 1)
             if room.is_free(box):

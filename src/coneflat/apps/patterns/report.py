@@ -8,7 +8,7 @@ import numpy as np
 
 from .allowances import shapely
 from .finish import Finish
-from .papers import Paper
+from .papers import EDGE, Paper
 from .result import Pattern
 from .shapes import piece_shapes
 from .tiling import tiles_of
@@ -25,7 +25,7 @@ def report_of(pattern: Pattern) -> dict[str, Any]:
     finish = Finish.of(pattern.kind, pattern.settings)
     shapes = piece_shapes(pattern.surface, pattern.borders, finish, pattern.tabs)
     cut = [shape.cut for shape in shapes]
-    width, height = shapely().total_bounds(cut)[2:].tolist()
+    width, height = (shapely().total_bounds(cut)[2:] + EDGE).tolist()
     paper = Paper.of(pattern.settings.get("page", "A4"))
     strains, lengths = np.abs(pattern.strains), pattern.surface.edges.lengths
     seams = [

@@ -22,14 +22,12 @@ class Tab:
     """A tab for glue beside a piece.
 
     Attributes:
+        polygon: (k, 2) its corners, mm, counterclockwise; it is folded along the line from the last to the first.
         piece: the piece.
-        points: (k, 2) its corners, mm; it is folded along the line from the last to the first.
-        seam: the name of its seam.
     """
 
+    polygon: FloatArray
     piece: int
-    points: FloatArray
-    seam: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +68,7 @@ def piece_shapes(
     for piece, loops in enumerate(borders.loops):
         rings = tuple(surface.points[tails(surface, loop)] for loop in loops)
         inside = polygon_of(rings)
-        own_tabs = [tab.points for tab in tabs if tab.piece == piece]
+        own_tabs = [tab.polygon for tab in tabs if tab.piece == piece]
         has_allowance = any(width[loop].any() for loop in loops)
         cut = widened(rings, [width[loop] for loop in loops], finish.is_round) if has_allowance else inside
         if own_tabs:
