@@ -12,6 +12,9 @@ from ... import TriangleMesh
 from ...base import FloatArray, IntArray
 from .cut_surface import CutSurface
 
+#: Difference of the lengths of the sides of a seam that can be neglected, mm.
+NEGLIGIBLE = 0.01
+
 
 @dataclass(frozen=True, eq=False)
 class Side:
@@ -45,6 +48,16 @@ class Seam:
     lengths: tuple[float, float]
     surface_length: float
     largest_gap: float
+
+    @property
+    def ease(self) -> float:
+        """The difference of the lengths of the sides, mm."""
+        return abs(self.lengths[0] - self.lengths[1])
+
+    @property
+    def is_eased(self) -> bool:
+        """Whether the sides differ in length by more than can be neglected."""
+        return self.ease > NEGLIGIBLE
 
     @property
     def is_dart(self) -> bool:

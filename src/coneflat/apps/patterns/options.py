@@ -6,7 +6,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from ...errors import OptionError
-from ...options import Choice, Direction, Edges, Kind, Number, RunOptions, option
+from ...options import Choice, Direction, Edges, Number, RunOptions, option
+from .finish import Allowances
+from .papers import PaperName
 from .units import MILLIMETRES, Length, Percentage
 
 if TYPE_CHECKING:
@@ -54,10 +56,10 @@ class PatternOptions(RunOptions):
     gores: int = option(12, Number(2, 1000, is_integer=True))
     axis: tuple[float, float, float] | None = option(None, Direction())
     allowance: float | None = option(None, Length(optional=True))
-    seam_allowances: str = option("", Kind())
+    seam_allowances: str = option("", Allowances())
     corners: str = option("mitred", Choice(("mitred", "round")))
     tabs: float = option(8.0, Length())
-    page: str = option("A4", Kind())
+    page: str = option("A4", PaperName())
 
     def __post_init__(self) -> None:
         if self.height is not None and (self.unit is not None or self.scale != 1.0):

@@ -37,7 +37,9 @@ class Length(Kind):
         length = length_of(value)
         if length is None or length < 0 or (self.is_positive and length == 0):
             least = "above 0" if self.is_positive else "0 or more"
-            raise OptionError(f"{name} must be a length, {least}, such as 7mm, 0.7cm or 0.25in, got {short_repr(value)}")
+            raise OptionError(
+                f"{name} must be a length, {least}, such as 7mm, 0.7cm or 0.25in, got {short_repr(value)}"
+            )
         return length
 
 
@@ -90,3 +92,9 @@ def text_of_size(extents: Any) -> str:
     longest = max(extents)
     unit, factor = ("m", 1000.0) if longest >= 10_000 else ("mm", 1.0)
     return " x ".join(f"{extent / factor:.3g}" for extent in extents) + f" {unit}"
+
+
+def area_text(area: float) -> str:
+    """Return an area in mm^2 as a text in square centimetres, with three digits or more."""
+    centimetres = area / 100
+    return f"{centimetres:.0f} cm\u00b2" if centimetres >= 100 else f"{centimetres:.3g} cm\u00b2"

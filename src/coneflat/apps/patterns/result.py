@@ -5,13 +5,21 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from os import PathLike
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ...base import FloatArray, IntArray
+from ...base import EntryPoint, FloatArray, IntArray
 from .borders import Borders, Seam, find_borders
 from .cut_surface import CutSurface
+from .drawing import Drawing
+from .shapes import Tab
+
+_DRAWING = EntryPoint[Drawing]("apps.patterns.outlines:drawing_of")
+_WRITE = EntryPoint[Path]("apps.patterns.files:write_pattern")
+_REPORT = EntryPoint[dict[str, Any]]("apps.patterns.report:report_of")
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,6 +33,7 @@ class Pattern:
         millimetres: millimetres per unit of the model.
         folds: (f, 2) points of fold lines inside pieces, and `fold_angles` (f,) their dihedral angles in radians,
             positive for mountain folds, negative for valleys.
+        tabs: tabs for glue, beside the pieces.
         notes: what could not be met, one sentence each.
         settings: the options.
     """
@@ -34,6 +43,7 @@ class Pattern:
     millimetres: float
     folds: IntArray = field(default_factory=lambda: np.empty((0, 2), dtype=np.int64))
     fold_angles: FloatArray = field(default_factory=lambda: np.empty(0))
+    tabs: tuple[Tab, ...] = ()
     notes: tuple[str, ...] = ()
     settings: Mapping[str, Any] = field(default_factory=dict)
 
@@ -61,3 +71,24 @@ class Pattern:
     def strains(self) -> FloatArray:
         """(k,) the relative change of length of each edge of the pieces, `surface.edges`."""
         return self.surface.edges.strains(self.surface.points)
+
+    def drawing(self) -> Drawing:
+        """Return the drawing: what is cut, folded and marked, with numbers and names, at its true size.
+
+        Raises:
+            OptionError: options of the pattern cannot be met, or shapely is not installed.
+        """
+        return _DRAWING(self)
+
+    def save(self, path: str | PathLike[str]) -> Path:
+        """Write the pattern at its true size, and return the path: .pdf in pages, .svg or .dxf as a single sheet.
+
+        Raises:
+            UnknownFormatError, MeshFileError: the file cannot be written.
+            OptionError: options of the pattern cannot be met, or a package is not installed.
+        """
+        return _WRITE(self, path)
+
+    def report(self) -> dict[str, Any]:
+        """Return all measures as a dictionary that can be written as JSON; lengths in mm, areas in mm^2."""
+        return _REPORT(self)
