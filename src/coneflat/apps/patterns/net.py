@@ -29,7 +29,7 @@ from .polyhedron import DIGITS, Polyhedron
 
 # Comparisons of boxes, about two nanoseconds each: for untangling one tree of all faces, for each attempt to join two
 # pieces, for all of these attempts, and for exchanging joined hinges for longer ones.
-TREE_BUDGET, JOIN_BUDGET, ALL_JOINS_BUDGET, EXCHANGE_BUDGET = 2 * 10**9, 5 * 10**7, 2 * 10**9, 10**9
+TREE_BUDGET, JOIN_BUDGET, ALL_JOINS_BUDGET, EXCHANGE_BUDGET = 1 * 10**9, 5 * 10**7, 2 * 10**9, 10**9
 # Collisions with which two pieces may be joined before they are untangled.
 JOINED_COLLISIONS = 12
 # Hinges between two pieces at which they are joined and untangled.
@@ -110,7 +110,11 @@ class _Search:
         self.faces, self.lengths = faces, lengths
         self.work: Workspace = workspace_of(faces)
         self.net = Placement(
-            np.zeros(h, dtype=bool), np.zeros(f, dtype=np.int64), np.empty((f, 4)), np.empty((m, 6)), np.empty((m, 4))
+            np.zeros(h, dtype=bool),
+            np.zeros(f, dtype=np.int64),
+            np.empty((f, 4)),
+            np.empty((m, 6)),
+            np.empty((m, 4)),
         )
         self.component_count = label_components(f, *faces.hinge_faces.T)[0]
 

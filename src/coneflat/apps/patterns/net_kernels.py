@@ -146,7 +146,9 @@ def _lies_outside(first: FloatArray, sides: FloatArray, second: FloatArray) -> b
 
 
 @compiled
-def triangles_overlap(first: FloatArray, sides: FloatArray, second: FloatArray, second_sides: FloatArray) -> bool:
+def triangles_overlap(
+    first: FloatArray, sides: FloatArray, second: FloatArray, second_sides: FloatArray
+) -> bool:
     """Return whether two counterclockwise triangles overlap by more than they may touch."""
     return not _lies_outside(first, sides, second) and not _lies_outside(second, second_sides, first)
 
@@ -170,7 +172,14 @@ class Space(NamedTuple):
 
 @compiled
 def find_collisions(
-    faces: Faces, net: Placement, walk: Walk, count: int, hinge: int, limit: int, space: Space, pairs: IntArray
+    faces: Faces,
+    net: Placement,
+    walk: Walk,
+    count: int,
+    hinge: int,
+    limit: int,
+    space: Space,
+    pairs: IntArray,
 ) -> tuple[int, int]:
     """Write pairs of triangles that would overlap if the faces of a walk were attached at a hinge to a face beyond.
 

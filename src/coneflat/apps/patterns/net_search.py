@@ -22,8 +22,8 @@ from .net_kernels import (
 
 # Hinges that are tried for each subtree that moves.
 TRIED_HINGES = 12
-# Mean number of additional collisions that a move may cause.
-TEMPERATURE = 0.5
+# Mean number of additional collisions that a move may cause: it falls from HOT to 0 in each cycle of comparisons.
+HOT, CYCLE = 2.0, 10**8
 # Largest number of collisions that are listed, per triangle: with more, a tree is not worth untangling.
 COLLISIONS_PER_TRIANGLE = 40
 # Constants of a linear congruential generator (Knuth).
@@ -61,7 +61,11 @@ def workspace_of(faces: Faces) -> Workspace:
     f, m, h = len(faces.starts) - 1, len(faces.triangles), len(faces.hinge_faces)
     integers = [np.empty(f, dtype=np.int64) for _ in range(6)]
     space = Space(
-        np.empty(m, dtype=np.int64), np.empty((m, 6)), np.empty((m, 4)), np.empty(m, dtype=np.int64), np.empty(4)
+        np.empty(m, dtype=np.int64),
+        np.empty((m, 6)),
+        np.empty((m, 4)),
+        np.empty(m, dtype=np.int64),
+        np.empty(4),
     )
     pairs, added = np.empty((2, COLLISIONS_PER_TRIANGLE * m + 100, 2), dtype=np.int64)
     owner = np.repeat(np.arange(f), np.diff(faces.starts))
@@ -174,7 +178,13 @@ def list_candidates(faces: Faces, count: int, cut: int, work: Workspace) -> int:
 
 @compiled
 def untangle(
-    faces: Faces, net: Placement, lengths: FloatArray, number: int, budget: int, work: Workspace, result: BoolArray
+    faces: Faces,
+    net: Placement,
+    lengths: FloatArray,
+    number: int,
+    budget: int,
+    work: Workspace,
+    result: BoolArray,
 ) -> tuple[int, int]:
     """Move subtrees until no pair of triangles of a piece overlaps, or the budget is spent.
 
@@ -204,7 +214,8 @@ def untangle(
         for i in range(number):
             is_first = work.walk.place[work.owner[work.pairs[i, 0]]] >= 0
             resolved += is_first != (work.walk.place[work.owner[work.pairs[i, 1]]] >= 0)
-        slack = int(-TEMPERATURE * math.log((1 + random_below(work.seed, 1 << 30)) / (1 << 30)))
+        temperature = HOT * (1 - (spent % CYCLE) / CYCLE)
+        slack = int(-temperature * math.log((1 + random_below(work.seed, 1 << 30)) / (1 << 30)))
         limit = min(resolved + slack + 1, len(work.pairs) - number)
         choices = list_candidates(faces, count, cut, work)
         chosen, least_added = -1, limit
@@ -249,7 +260,9 @@ def cut_collisions(faces: Faces, net: Placement, lengths: FloatArray, number: in
                 counts[work.walk.hinges[work.path[j]]] += 1
         cut = 0
         for hinge in range(len(lengths)):
-            if counts[hinge] > counts[cut] or (counts[hinge] == counts[cut] and lengths[hinge] < lengths[cut]):
+            if counts[hinge] > counts[cut] or (
+                counts[hinge] == counts[cut] and lengths[hinge] < lengths[cut]
+            ):
                 cut = hinge
         net.is_joined[cut] = False
         walk_joined(faces, net.is_joined, faces.hinge_faces[cut, 0], -1, work.walk)

@@ -68,7 +68,8 @@ class Polyhedron:
         triangle, corner = halfedges // 3, halfedges % 3
         starts, ends = self.places[triangle, (corner + 1) % 3], self.places[triangle, (corner + 2) % 3]
         return np.stack(
-            [np.stack([starts[:, 0], ends[:, 0]], axis=1), np.stack([ends[:, 1], starts[:, 1]], axis=1)], axis=1
+            [np.stack([starts[:, 0], ends[:, 0]], axis=1), np.stack([ends[:, 1], starts[:, 1]], axis=1)],
+            axis=1,
         )
 
 
@@ -130,7 +131,9 @@ def _hinges(mesh: TriangleMesh, face: IntArray, vertex_key: FloatArray) -> tuple
     lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
     key = vertex_key[mesh.edges[edges]].sum(axis=1)
     size = lengths.max(initial=0.0)
-    order = np.lexsort([key, -np.round(lengths / max(size, np.finfo(float).tiny), DIGITS), pairs[:, 1], pairs[:, 0]])
+    order = np.lexsort(
+        [key, -np.round(lengths / max(size, np.finfo(float).tiny), DIGITS), pairs[:, 1], pairs[:, 0]]
+    )
     is_first = _are_first(pairs[order])
     group = np.cumsum(is_first) - 1
     return edges[order[is_first]], np.bincount(group, lengths[order]) if len(group) else np.empty(0)
