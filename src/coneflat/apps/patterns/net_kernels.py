@@ -9,10 +9,6 @@ import numpy as np
 
 from ...base import BoolArray, FloatArray, IntArray, compiled
 
-# Depth up to which triangles touch and do not overlap, relative to the root of the area of the surface: a third of a
-# micrometre where that is 300 mm. Sides that meet in the plane differ by the rounding of the coordinates of the model.
-TOUCHING = 1e-6
-
 
 class Faces(NamedTuple):
     """Faces of a polyhedron of m triangles, sorted by face, and the hinges between them.
@@ -24,6 +20,7 @@ class Faces(NamedTuple):
         hinge_faces: (h, 2) the two faces of each hinge.
         hinge_ends: (h, 2, 4) x and y of its ends in the frames of both.
         hinge_starts, hinges: (f + 1,) and (2h,) the hinges of each face.
+        touching: depth up to which triangles touch and do not overlap.
     """
 
     starts: IntArray
@@ -33,6 +30,7 @@ class Faces(NamedTuple):
     hinge_ends: FloatArray
     hinge_starts: IntArray
     hinges: IntArray
+    touching: float
 
 
 class Placement(NamedTuple):
@@ -130,12 +128,12 @@ def place_joined(faces: Faces, net: Placement, walk: Walk, count: int) -> None:
 
 
 @compiled
-def _lies_outside(first: FloatArray, sides: FloatArray, second: FloatArray) -> bool:
+def _lies_outside(first: FloatArray, sides: FloatArray, second: FloatArray, touching: float) -> bool:
     """Return whether a side of a triangle has the other triangle on its right, but for touching."""
     for i in range(3):
         x, y = first[2 * i], first[2 * i + 1]
         u, v = first[(2 * i + 2) % 6] - x, first[(2 * i + 3) % 6] - y
-        limit = TOUCHING * sides[i]
+        limit = touching * sides[i]
         if (
             u * (second[1] - y) - v * (second[0] - x) <= limit
             and u * (second[3] - y) - v * (second[2] - x) <= limit
@@ -147,10 +145,12 @@ def _lies_outside(first: FloatArray, sides: FloatArray, second: FloatArray) -> b
 
 @compiled
 def triangles_overlap(
-    first: FloatArray, sides: FloatArray, second: FloatArray, second_sides: FloatArray
+    faces: Faces, first: int, place: FloatArray, second: int, second_place: FloatArray
 ) -> bool:
-    """Return whether two counterclockwise triangles overlap by more than they may touch."""
-    return not _lies_outside(first, sides, second) and not _lies_outside(second, second_sides, first)
+    """Return whether two triangles at places (6,) in the plane overlap by more than they may touch."""
+    return not _lies_outside(place, faces.sides[first], second_place, faces.touching) and not _lies_outside(
+        second_place, faces.sides[second], place, faces.touching
+    )
 
 
 class Space(NamedTuple):
@@ -232,7 +232,7 @@ def find_collisions(
             moved = space.boxes[k]
             if box[0] < moved[2] and box[1] < moved[3] and box[2] > moved[0] and box[3] > moved[1]:
                 u = space.items[k]
-                if triangles_overlap(net.triangles[t], faces.sides[t], space.triangles[k], faces.sides[u]):
+                if triangles_overlap(faces, t, net.triangles[t], u, space.triangles[k]):
                     pairs[number, 0], pairs[number, 1] = t, u
                     number += 1
                     if number == limit:
@@ -253,7 +253,7 @@ def find_all_collisions(faces: Faces, net: Placement, owner: IntArray, pairs: In
                 and net.boxes[t, 3] > net.boxes[u, 1]
                 and owner[t] != owner[u]
                 and net.piece[owner[t]] == net.piece[owner[u]]
-                and triangles_overlap(net.triangles[t], faces.sides[t], net.triangles[u], faces.sides[u])
+                and triangles_overlap(faces, t, net.triangles[t], u, net.triangles[u])
             ):
                 pairs[number, 0], pairs[number, 1] = t, u
                 number += 1

@@ -23,7 +23,7 @@ from .net_kernels import (
 # Hinges that are tried for each subtree that moves.
 TRIED_HINGES = 12
 # Mean number of additional collisions that a move may cause: it falls from HOT to 0 in each cycle of comparisons.
-HOT, CYCLE = 2.0, 10**8
+HOT, CYCLE = 4.0, 10**8
 # Largest number of collisions that are listed, per triangle: with more, a tree is not worth untangling.
 COLLISIONS_PER_TRIANGLE = 40
 # Constants of a linear congruential generator (Knuth).
