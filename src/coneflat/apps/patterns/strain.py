@@ -160,7 +160,9 @@ class _PowerSum:
         if not (ratios > 0).all():
             return np.inf
         areas = AREAS * float((ratios + 1 / ratios - 2).sum())
-        return float(self.weights @ powers + self.difference_weights @ (self.differences @ strains) ** 2) + areas
+        return (
+            float(self.weights @ powers + self.difference_weights @ (self.differences @ strains) ** 2) + areas
+        )
 
     def derivatives(self, points: FloatArray, bounds: FloatArray) -> tuple[FloatArray, csr_matrix]:
         """Return (2n,) the gradient, and (2n, 2n) the positive part of the Hessian."""
@@ -283,7 +285,9 @@ def _smallest_step(change: csr_matrix, closing: csr_matrix, gaps: FloatArray) ->
     stiffness = change.T @ change
     penalty = 1e6
     matrix = csc_matrix(
-        stiffness + penalty * (closing.T @ closing) + 1e-6 * stiffness.diagonal().mean() * eye(closing.shape[1])
+        stiffness
+        + penalty * (closing.T @ closing)
+        + 1e-6 * stiffness.diagonal().mean() * eye(closing.shape[1])
     )
     matrix.sort_indices()
     factor = factorize(matrix)

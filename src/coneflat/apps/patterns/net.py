@@ -1,0 +1,247 @@
+"""Exact unfolding of polyhedra into as few pieces as possible that do not overlap."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from scipy.sparse import csr_matrix
+from scipy.sparse.csgraph import minimum_spanning_tree
+
+from ... import TriangleMesh
+from ...base import BoolArray, FloatArray, IntArray
+from ...geometry import dihedral_angles, double_areas, edge_lengths, face_normals, unit_vectors
+from ...mesh import label_components
+from .cut_surface import CutSurface
+from .development import Development, find_folds
+from .net_kernels import Faces, Placement
+from .net_search import (
+    Workspace,
+    cut_collisions,
+    join_at,
+    join_longest,
+    place_and_collide,
+    place_pieces,
+    untangle,
+    workspace_of,
+)
+from .polyhedron import DIGITS, Polyhedron
+
+# Comparisons of boxes, about two nanoseconds each: for untangling one tree of all faces, for each attempt to join two
+# pieces, for all of these attempts, and for exchanging joined hinges for longer ones.
+TREE_BUDGET, JOIN_BUDGET, ALL_JOINS_BUDGET, EXCHANGE_BUDGET = 1 * 10**9, 5 * 10**7, 2 * 10**9, 10**9
+# Depths up to which triangles touch and do not overlap, relative to the root of the area of the surface. The second is
+# a third of a micrometre where that is 300 mm: coordinates of single precision may need it along divided edges.
+TOUCHING, NOISY_TOUCHING = 1e-11, 1e-6
+# Collisions with which two pieces may be joined before they are untangled.
+JOINED_COLLISIONS = 12
+# Hinges between two pieces at which they are joined and untangled.
+TRIED_JOINTS = 6
+# Largest gap between the two sides of an edge that are joined, relative to its length.
+JOIN_GAP = 1e-10
+# Directions for which steep edges are cut.
+STEEP_DIRECTIONS = 6
+
+
+def unfold_net(mesh: TriangleMesh) -> Development:
+    """Return a polyhedron unfolded into as few pieces as were found that do not overlap; among these, short seams.
+
+    Faces may touch along sides. Lengths and angles are exact: each face is placed rigidly.
+
+    Args:
+        mesh: a mesh of any topology whose triangles have area. Coplanar triangles form faces, which are not cut.
+
+    Notes:
+        Trees of faces are searched by simulated annealing on the number of overlapping triangles, where a subtree is
+        cut off and attached at another edge (similar to L. Zawallich, R. Pajarola, "Unfolding polyhedra via tabu
+        search", 2024), starting from the best of several spanning trees: that of the longest joined edges, of the
+        flattest ones, and those with the steepest edges cut (W. Schlickenrieder, "Nets of polyhedra", 1997). If
+        collisions remain, the tree is cut, and the same search joins pieces.
+    """
+    polyhedron = Polyhedron.of(mesh)
+    unit = np.sqrt(double_areas(edge_lengths(mesh.vertices, mesh.faces)).sum() / 2)
+    faces, order = _faces(polyhedron, unit)
+    lengths = np.round(polyhedron.hinge_lengths / unit, DIGITS)
+    weights = list(_weights(polyhedron))
+    search = _Search(faces, lengths)
+    net = search.fewest_pieces(weights)
+    if net.piece.max() + 1 > search.component_count:
+        noisy = _Search(faces._replace(touching=NOISY_TOUCHING), lengths).fewest_pieces(weights)
+        net = min(net, noisy, key=lambda placement: int(placement.piece.max()))
+    places = np.empty((len(order), 3, 2))
+    places[order] = net.triangles.reshape(-1, 3, 2) * unit
+    surface = _joined(mesh, places, net.piece[polyhedron.face])
+    folds, angles = find_folds(surface)
+    return Development(surface, folds, angles)
+
+
+def _faces(polyhedron: Polyhedron, unit: float) -> tuple[Faces, IntArray]:
+    """Return the faces in units of a length, and the triangles in their order."""
+    order = np.argsort(polyhedron.face, kind="stable")
+    count = int(polyhedron.face.max()) + 1
+    places = polyhedron.places[order] / unit
+    sides = np.linalg.norm(places[:, [1, 2, 0]] - places, axis=2)
+    hinge_faces = polyhedron.hinge_faces
+    starts = np.concatenate([[0], np.cumsum(np.bincount(polyhedron.face, minlength=count))])
+    flat = hinge_faces.ravel()
+    hinge_starts = np.concatenate([[0], np.cumsum(np.bincount(flat, minlength=count))])
+    hinges = np.argsort(flat, kind="stable") // 2
+    ends = (polyhedron.hinge_ends / unit).reshape(-1, 2, 4)
+    return Faces(
+        starts, places.reshape(-1, 6), sides, hinge_faces, ends, hinge_starts, hinges, TOUCHING
+    ), order
+
+
+def _weights(polyhedron: Polyhedron) -> Iterator[FloatArray]:
+    """Yield (h,) orders of hinges, the smallest first: those that spanning trees join."""
+    mesh, hinges = polyhedron.mesh, polyhedron.hinges
+    yield -polyhedron.hinge_lengths
+    yield np.abs(dihedral_angles(mesh)[hinges])
+    ends = mesh.vertices[mesh.edges[hinges]]
+    along = unit_vectors(ends[:, 1] - ends[:, 0])
+    normals = unit_vectors(face_normals(mesh.vertices, mesh.faces))
+    first = np.unique(polyhedron.face, return_index=True)[1]
+    for triangle in first[np.linspace(0, len(first) - 1, STEEP_DIRECTIONS).astype(int)]:
+        # A little off the normal of a face, so that edges in its plane are not equally steep.
+        side = mesh.vertices[mesh.faces[triangle, 1]] - mesh.vertices[mesh.faces[triangle, 0]]
+        yield np.abs(along @ (normals[triangle] + 0.3 * side / np.linalg.norm(side)))
+
+
+class _Search:
+    """The search for a net.
+
+    Args:
+        faces: the faces.
+        lengths: (h,) lengths of the hinges.
+    """
+
+    def __init__(self, faces: Faces, lengths: FloatArray) -> None:
+        f, m, h = len(faces.starts) - 1, len(faces.triangles), len(lengths)
+        self.faces, self.lengths = faces, lengths
+        self.work: Workspace = workspace_of(faces)
+        self.net = Placement(
+            np.zeros(h, dtype=bool),
+            np.zeros(f, dtype=np.int64),
+            np.empty((f, 4)),
+            np.empty((m, 6)),
+            np.empty((m, 4)),
+        )
+        self.component_count = label_components(f, *faces.hinge_faces.T)[0]
+
+    def fewest_pieces(self, weights: Sequence[FloatArray]) -> Placement:
+        """Return the placement with the fewest pieces that was found."""
+        trees = [self._spanning_forest(weight) for weight in weights]
+        counts = [self._placed(tree) for tree in trees]
+        best = int(np.argmin(counts))
+        number = self._placed(trees[best])
+        if number:
+            tree = np.empty_like(trees[best])
+            untangle(self.faces, self.net, self.lengths, number, TREE_BUDGET, self.work, tree)
+            number = self._placed(tree)
+            cut_collisions(self.faces, self.net, self.lengths, number, self.work)
+            place_pieces(self.faces, self.net, self.work.walk)
+            self._exchange(1)
+            self._join_pieces()
+        self._exchange(10)
+        place_pieces(self.faces, self.net, self.work.walk)
+        return self.net
+
+    def _spanning_forest(self, weight: FloatArray) -> BoolArray:
+        """Return (h,) the hinges of the spanning forest that joins those of small weight."""
+        rank = np.empty(len(weight))
+        rank[np.lexsort([-self.lengths, np.round(weight, DIGITS)])] = np.arange(1, len(weight) + 1)
+        count = len(self.net.piece)
+        matrix = csr_matrix((rank, self.faces.hinge_faces.T), shape=(count, count))
+        tree = np.zeros(len(weight), dtype=bool)
+        tree[np.argsort(rank)[minimum_spanning_tree(matrix).data.astype(int) - 1]] = True
+        return tree
+
+    def _placed(self, tree: BoolArray) -> int:
+        """Place the faces joined at given hinges; return the number of pairs of triangles that overlap."""
+        self.net.is_joined[:] = tree
+        return place_and_collide(self.faces, self.net, self.work)
+
+    def _exchange(self, rounds: int) -> None:
+        order = np.lexsort([np.arange(len(self.lengths)), -self.lengths])
+        spent = 0
+        for _ in range(rounds):
+            changes, comparisons = join_longest(
+                self.faces, self.net, self.lengths, order, EXCHANGE_BUDGET - spent, self.work
+            )
+            spent += comparisons
+            if not changes:
+                break
+
+    def _join_pieces(self) -> None:
+        """Join pieces, the smallest first, and untangle them, until none can be joined any more or time is up."""
+        spent, failed = 0, set[int]()
+        while spent < ALL_JOINS_BUDGET:
+            piece = self._smallest_piece(failed)
+            if piece is None:
+                return
+            before = self.net.is_joined.copy()
+            face = int(np.flatnonzero(self.net.piece == piece)[0])
+            is_done, comparisons = self._join_piece(piece)
+            spent += comparisons
+            if is_done:
+                failed = set()
+            else:
+                self.net.is_joined[:] = before
+                failed.add(face)
+            place_pieces(self.faces, self.net, self.work.walk)
+
+    def _smallest_piece(self, failed: set[int]) -> int | None:
+        """Return the smallest piece that has neighbours and does not have a face that failed."""
+        pieces = self.net.piece[self.faces.hinge_faces]
+        candidates = np.unique(pieces[pieces[:, 0] != pieces[:, 1]])
+        candidates = candidates[~np.isin(candidates, self.net.piece[list(failed)])]
+        if not len(candidates):
+            return None
+        sizes = np.bincount(self.net.piece)[candidates]
+        return int(candidates[sizes.argmin()])
+
+    def _join_piece(self, piece: int) -> tuple[bool, int]:
+        """Join a piece with a neighbour; return whether no triangles overlap then, and the comparisons made."""
+        before = self.net.is_joined.copy()
+        pieces = self.net.piece[self.faces.hinge_faces]
+        hinges = np.flatnonzero((pieces[:, 0] != pieces[:, 1]) & (pieces == piece).any(axis=1))
+        spent, counts = 0, []
+        for hinge in hinges.tolist():
+            number, comparisons = join_at(self.faces, self.net, hinge, JOINED_COLLISIONS, self.work)
+            spent += comparisons
+            if number == 0:
+                return True, spent
+            counts.append(number)
+            if number < JOINED_COLLISIONS:
+                self.net.is_joined[:] = before
+                place_pieces(self.faces, self.net, self.work.walk)
+        result = np.empty_like(before)
+        for i in np.lexsort([-self.lengths[hinges], counts])[:TRIED_JOINTS].tolist():
+            if counts[i] == JOINED_COLLISIONS:
+                break
+            number, _ = join_at(self.faces, self.net, int(hinges[i]), JOINED_COLLISIONS, self.work)
+            number, comparisons = untangle(
+                self.faces, self.net, self.lengths, number, JOIN_BUDGET, self.work, result
+            )
+            spent += comparisons
+            if number == 0:
+                self.net.is_joined[:] = result
+                return True, spent
+            self.net.is_joined[:] = before
+            place_pieces(self.faces, self.net, self.work.walk)
+        return False, spent
+
+
+def _joined(mesh: TriangleMesh, places: FloatArray, piece: IntArray) -> CutSurface:
+    """Return the cut surface of placed triangles: edges of a piece whose two sides coincide are joined."""
+    halfedges = mesh.edge_halfedges
+    triangle, corner = halfedges // 3, halfedges % 3
+    starts, ends = places[triangle, (corner + 1) % 3], places[triangle, (corner + 2) % 3]
+    gap = np.maximum(
+        np.linalg.norm(starts[:, 0] - ends[:, 1], axis=1), np.linalg.norm(ends[:, 0] - starts[:, 1], axis=1)
+    )
+    lengths = np.linalg.norm(ends[:, 0] - starts[:, 0], axis=1)
+    is_joined = (piece[mesh.edge_faces[:, 0]] == piece[mesh.edge_faces[:, 1]]) & (gap <= JOIN_GAP * lengths)
+    seams = np.flatnonzero(~is_joined & ~mesh.is_boundary_edge)
+    whole = CutSurface(mesh, mesh.faces, np.zeros((len(mesh.vertices), 2)))
+    return whole.cut_along(seams, places)
