@@ -13,13 +13,17 @@ from typing import Any
 import numpy as np
 
 from ... import TriangleMesh, unwrap
-from ...base import BoolArray, FloatArray, IntArray, mask_of
+from ...base import BoolArray, FloatArray, IntArray, Unmet, mask_of, plural
 from ...errors import MetricError
 from ...geometry import angle_defect, corner_angles, edge_lengths
 from ...linalg.shortest_paths import MultiGraph
 from ...mesh import label_components
+from .borders import find_borders
 from .cut_surface import CutSurface
+from .development import Development
+from .options import PatternOptions
 from .separation import without_overlaps
+from .smooth_seams import with_smooth_seams
 from .strain import Stretch, least_strain, relative_strains, with_equal_sides
 
 # The symmetric Dirichlet energy of an isometry.
@@ -27,8 +31,8 @@ ISOMETRIC = 4.0
 # The energy above that of an isometry, relative to the squared strain that is allowed, of the first texture. Strains
 # that are evenly distributed up to the bound in all directions give 8/3.
 ENERGY_PER_STRAIN = 3.0
-# Multiples of it that are tried.
-ENERGY_FACTORS = (1.0, 2.0, 0.5)
+# Textures that are tried: with twice the energy as long as seams get shorter, or half of it if the strain is too large.
+TEXTURES = 5
 # Exponents of the strain: of layouts in which it is evened out moderately, and then for the smallest largest one.
 EVEN, SMALLEST = (2, 4), (8, 16, 32)
 # Fraction of edges beyond the bound above which the seams of a texture are too few, so that slits cannot help.
@@ -41,27 +45,80 @@ ROUNDING = 1e-9
 AIM = 0.99
 
 
-def cut_cloth(mesh: Any, stretch: Stretch, **options: Any) -> CutSurface:
+def cloth_pieces(mesh: TriangleMesh, options: PatternOptions) -> Development:
+    """Return a mesh cut into pieces of cloth, with smooth seams, and notes on bounds that were not met."""
+    warp, weft = options.stretch_warp or options.strain, options.stretch_weft or options.strain
+    stretch = Stretch(warp, weft)
+    surface = cut_cloth(mesh, stretch, seams=options.seams)
+    if options.darts == "none":
+        surface = without_darts(surface, stretch)
+    smooth = slit_until_within(with_smooth_seams(surface, options.smoothing), stretch)
+    if not excess(smooth, stretch).any() or excess(surface, stretch).any():
+        surface = smooth
+    beyond = excess(surface, stretch)
+    notes = []
+    if beyond.any():
+        reached = 100 * float(np.abs(surface.edges.strains(surface.points)).max())
+        notes.append(
+            Unmet(
+                f"{plural(int((beyond > 0).sum()), 'edge')} of {len(beyond):,} are strained more than allowed, up to "
+                f"{reached:.2g} %, and no cut with less was found: allow more, or refine the mesh there."
+            )
+        )
+    return Development(surface, notes=tuple(notes))
+
+
+def cut_cloth(mesh: TriangleMesh, stretch: Stretch, seams: Any = None) -> CutSurface:
     """Return a mesh cut into the pieces with the shortest seams that were found for a bound of the strain.
 
     If no cut within the bound was found, it is the one with the smallest largest strain.
 
     Args:
-        mesh: as for `coneflat.unwrap`.
+        mesh: the mesh.
         stretch: the bound.
-        options: of `coneflat.unwrap`.
+        seams: edges that must be cut, as for `coneflat.unwrap`.
     """
     first = ENERGY_PER_STRAIN * (stretch.warp**2 + stretch.weft**2) / 2
-    candidates = []
-    for factor in ENERGY_FACTORS:
-        texture = unwrap(mesh, max_energy=ISOMETRIC + factor * first, packing_cuts=0.0, **options)
-        candidates.append(slit_until_within(CutSurface.of(texture), stretch))
-        if not len(texture.seams):
+    shortest, smallest, factor = None, None, 1.0
+    for _ in range(TEXTURES):
+        texture = unwrap(
+            mesh.vertices, mesh.faces, max_energy=ISOMETRIC + factor * first, packing_cuts=0.0, seams=seams
+        )
+        surface = slit_until_within(CutSurface.of(texture), stretch)
+        beyond = excess(surface, stretch).max()
+        if beyond == 0:
+            if shortest is not None and surface.seam_length >= shortest.seam_length:
+                break
+            shortest = surface
+            if not len(surface.seams) or smallest is not None:
+                break
+            factor *= 2
+        elif shortest is not None:
             break
-    within = [candidate for candidate in candidates if not excess(candidate, stretch).any()]
-    if within:
-        return min(within, key=lambda candidate: candidate.seam_length)
-    return min(candidates, key=lambda candidate: excess(candidate, stretch).max())
+        else:
+            if smallest is None or beyond < excess(smallest, stretch).max():
+                smallest = surface
+            factor /= 2
+    return shortest or smallest
+
+
+def without_darts(surface: CutSurface, stretch: Stretch) -> CutSurface:
+    """Return a surface whose cuts that ended in a tip inside a piece go on to another border."""
+    while darts := [seam for seam in find_borders(surface).seams if seam.is_dart]:
+        dart = darts[0]
+        mesh, along = surface.mesh, surface.mesh.halfedge_edges[dart.sides[0].halfedges]
+        tip = int(surface.mesh.faces.ravel()[np.flatnonzero(surface.corners.ravel() == dart.tip)[0]])
+        costs = surface.edge_lengths.copy()
+        costs[surface.seams] = np.inf
+        is_goal = surface.is_border_vertex.copy()
+        is_goal[mesh.edges[along]] = False
+        graph = MultiGraph(len(mesh.vertices), mesh.edges, costs, mesh.incident_edges)
+        paths = graph.shortest_paths(np.flatnonzero(is_goal))
+        nodes = paths.nodes_to(np.array([tip]))
+        if not len(nodes):
+            break
+        surface = surface.cut_along(np.union1d(surface.seams, paths.edge[nodes]))
+    return slit_until_within(surface, stretch)
 
 
 def excess(surface: CutSurface, stretch: Stretch) -> FloatArray:
