@@ -6,15 +6,12 @@ the nearest seam relax them. The energy is varied, and the shortest seams are ke
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from ... import TriangleMesh, unwrap
 from ...base import BoolArray, FloatArray, IntArray, Unmet, mask_of, plural
-from ...errors import MetricError
 from ...geometry import angle_defect, corner_angles, edge_lengths
 from ...linalg.shortest_paths import MultiGraph
 from ...mesh import label_components
@@ -22,9 +19,11 @@ from .borders import find_borders
 from .cut_surface import CutSurface
 from .development import Development
 from .options import PatternOptions
+from .relaxing import EVEN, SMALLEST, closed_seams, excess, relaxed
 from .separation import without_overlaps
+from .small_pieces import without_small_pieces
 from .smooth_seams import with_smooth_seams
-from .strain import Stretch, least_strain, relative_strains, with_equal_sides
+from .strain import Stretch
 
 # The symmetric Dirichlet energy of an isometry.
 ISOMETRIC = 4.0
@@ -33,16 +32,10 @@ ISOMETRIC = 4.0
 ENERGY_PER_STRAIN = 3.0
 # Textures that are tried: with twice the energy as long as seams get shorter, or half of it if the strain is too large.
 TEXTURES = 5
-# Exponents of the strain: of layouts in which it is evened out moderately, and then for the smallest largest one.
-EVEN, SMALLEST = (2, 4), (8, 16, 32)
 # Fraction of edges beyond the bound above which the seams of a texture are too few, so that slits cannot help.
 MAX_STRAINED = 0.5
 # Rounds of slits, each at the worst vertex of every strained region.
 ROUNDS = 12
-# Excess of the relative strain that is left to rounding.
-ROUNDING = 1e-9
-# The strain that layouts aim at, relative to the bound: making the sides of seams equally long adds a little.
-AIM = 0.99
 
 
 def cloth_pieces(mesh: TriangleMesh, options: PatternOptions) -> Development:
@@ -55,6 +48,7 @@ def cloth_pieces(mesh: TriangleMesh, options: PatternOptions) -> Development:
     smooth = slit_until_within(with_smooth_seams(surface, options.smoothing), stretch)
     if not excess(smooth, stretch).any() or excess(surface, stretch).any():
         surface = smooth
+    surface = without_small_pieces(surface, stretch)
     beyond = excess(surface, stretch)
     notes = []
     if beyond.any():
@@ -121,48 +115,27 @@ def without_darts(surface: CutSurface, stretch: Stretch) -> CutSurface:
     return slit_until_within(surface, stretch)
 
 
-def excess(surface: CutSurface, stretch: Stretch) -> FloatArray:
-    """Return (k,) how far the relative strain of each flat edge is beyond the bound, 0 within it."""
-    strains = np.abs(relative_strains(surface.edges, surface.points, stretch))
-    return np.where(strains > 1 + ROUNDING, strains - 1, 0.0)
-
-
 def slit_until_within(surface: CutSurface, stretch: Stretch) -> CutSurface:
     """Return a cut surface with slits from its seams, until its strain is within the bound, or no slit helps.
 
     Slits end where the strain is concentrated if it is only moderately evened out: the more it is, the more edges have
     the largest one.
     """
-    even = _relaxed(surface, stretch, EVEN)
+    even = relaxed(surface, stretch, EVEN)
     for _ in range(ROUNDS):
-        flat = without_overlaps(_relaxed(even, stretch, SMALLEST))
+        flat = without_overlaps(relaxed(even, stretch, SMALLEST))
         if len(flat.seams) > len(even.seams):
-            even = _relaxed(even.cut_along(flat.seams, flat.places), stretch, EVEN[-1:])
-            flat = _relaxed(even, stretch, SMALLEST)
-        closed = _with_equal_sides(flat)
+            even = relaxed(even.cut_along(flat.seams, flat.places), stretch, EVEN[-1:])
+            flat = relaxed(even, stretch, SMALLEST)
+        closed = closed_seams(flat)
         beyond = excess(closed, stretch)
         if not beyond.any() or (beyond > 0).mean() > MAX_STRAINED:
             break
         tips = _worst_vertices(even, excess(even, stretch), beyond > 0)
         if not len(tips):
             break
-        even = _relaxed(even.cut_along(_with_slits(even, tips)), stretch, EVEN[-1:])
+        even = relaxed(even.cut_along(_with_slits(even, tips)), stretch, EVEN[-1:])
     return closed
-
-
-def _relaxed(surface: CutSurface, stretch: Stretch, exponents: Sequence[int]) -> CutSurface:
-    aim = Stretch(AIM * stretch.warp, AIM * stretch.weft)
-    points = least_strain(surface.edges, surface.corners, surface.points, aim, tuple(exponents))
-    return replace(surface, points=points)
-
-
-def _with_equal_sides(surface: CutSurface) -> CutSurface:
-    """Return a surface whose seams have sides of the same length, where that is possible."""
-    try:
-        points = with_equal_sides(surface.edges, surface.corners, surface.points)
-    except MetricError:
-        return surface  # The sides of seams are eased, which the pattern says.
-    return replace(surface, points=points)
 
 
 def _worst_vertices(surface: CutSurface, beyond: FloatArray, remains: BoolArray) -> IntArray:

@@ -110,13 +110,17 @@ def _millimetres(
     if options.height is not None:
         extent = float(np.ptp(vertices @ axis))
         if not extent > 0:
-            raise OptionError("height needs a model with a height, but its extent along the axis is 0: give a unit")
+            raise OptionError(
+                "height needs a model with a height, but its extent along the axis is 0: give a unit"
+            )
         return options.height / extent, ()
     extents = np.ptp(vertices, axis=0)
     unit = options.unit or FORMAT_UNITS.get(ending)
     if unit is None:
         sizes = " or ".join(f"{name} ({text_of_size(extents * MILLIMETRES[name])})" for name in MILLIMETRES)
-        raise OptionError(f"the model has no unit: give unit as {sizes}, or give the height of the finished object")
+        raise OptionError(
+            f"the model has no unit: give unit as {sizes}, or give the height of the finished object"
+        )
     factor = MILLIMETRES[unit] * options.scale
     size = text_of_size(extents * factor)
     assumed = () if options.unit else (f"{ending} files are in metres: the model is {size}.",)

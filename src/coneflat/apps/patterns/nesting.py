@@ -204,5 +204,7 @@ def _moved(pattern: Pattern, packing: SheetPacking) -> Pattern:
     for piece in range(pattern.piece_count):
         members = np.unique(surface.corners[surface.pieces == piece])
         points[members] = _placed_points(points[members], packing, piece)
-    tabs = tuple(replace(tab, polygon=_placed_points(tab.polygon, packing, tab.piece)) for tab in pattern.tabs)
+    tabs = tuple(
+        replace(tab, polygon=_placed_points(tab.polygon, packing, tab.piece)) for tab in pattern.tabs
+    )
     return replace(pattern, surface=replace(surface, points=points), tabs=tabs)

@@ -23,7 +23,7 @@ def without_overlaps(surface: CutSurface) -> CutSurface:
         points = surface.points[indices]
         mesh = TriangleMesh(np.pad(points, ((0, 0), (0, 1))), corners.reshape(-1, 3))
         edges = _edges_of_surface(surface, faces, mesh)
-        charts = injective_charts(mesh, points, mesh.faces, surface.edge_lengths[edges], tries=1)
+        charts = injective_charts(mesh, points, mesh.faces, surface.edge_lengths[edges])
         places[faces] = charts.points[charts.corners]
         seams.append(edges[point_seams(mesh, charts.corners)])
     return surface.cut_along(np.unique(np.concatenate(seams)), places)

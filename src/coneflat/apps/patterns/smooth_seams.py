@@ -75,10 +75,8 @@ def _is_bad(before: FloatArray, after: FloatArray, faces: IntArray) -> BoolArray
     return (sizes[1] < MIN_AREA * sizes[0]) | (cosines < MIN_COSINE * sizes[0] * sizes[1])
 
 
-def _near_enough(
-    surface: CutSurface, moved: CutSurface, tree: TriangleTree, tolerance: float
-) -> CutSurface:
-    """Return the moved surface, with vertices nearer to their old places where it is farther away than the tolerance."""
+def _near_enough(surface: CutSurface, moved: CutSurface, tree: TriangleTree, tolerance: float) -> CutSurface:
+    """Return the moved surface, with vertices nearer to their old places where it is too far away."""
     faces, before = surface.mesh.faces, surface.mesh.vertices
     vertices = moved.mesh.vertices
     for halving in range(HALVINGS):
@@ -98,7 +96,9 @@ def _is_far(
 ) -> BoolArray:
     """Return (m,) triangles that are farther from the surface before than the tolerance, or that left a part of it."""
     middles = (after[faces] + after[faces[:, [1, 2, 0]]]) / 2
-    there = np.linalg.norm(_nearest(tree, before, faces, middles.reshape(-1, 3)) - middles.reshape(-1, 3), axis=1)
+    there = np.linalg.norm(
+        _nearest(tree, before, faces, middles.reshape(-1, 3)) - middles.reshape(-1, 3), axis=1
+    )
     is_far = there.reshape(-1, 3).max(axis=1) > tolerance
     samples = np.concatenate([before[faces], (before[faces] + before[faces[:, [1, 2, 0]]]) / 2], axis=1)
     near = _nearest(TriangleTree(after, faces), after, faces, samples.reshape(-1, 3))

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.sparse import csc_matrix, csr_matrix, diags, eye
 
 from ... import TriangleMesh
-from ...base import FloatArray, IntArray
+from ...base import BoolArray, FloatArray, IntArray
 from ...errors import MetricError
 from ...geometry import double_areas, edge_lengths, signed_double_areas
 from ...linalg import Factor, factorize
@@ -105,6 +105,7 @@ def least_strain(
     points: FloatArray,
     stretch: Stretch,
     exponents: tuple[int, ...] = EXPONENTS,
+    is_free: BoolArray | None = None,
 ) -> FloatArray:
     """Return points (n, 2) in the plane whose largest strain, relative to what a material allows, is small.
 
@@ -116,10 +117,12 @@ def least_strain(
         points: (n, 2) places without flipped triangles to start from.
         stretch: what the material allows.
         exponents: of the strain, whose sum over all edges, weighted by squared lengths, is minimised for each in turn.
+        is_free: (n,) the points that move; None for all.
 
     Notes:
         Newton's method with the positive part of the Hessian. The bounds by direction are those at the start of a step.
     """
+    moving = np.flatnonzero(np.repeat(np.ones(len(points), dtype=bool) if is_free is None else is_free, 2))
     factor: Factor | None = None
     matrix: csc_matrix | None = None
     for exponent in exponents:
@@ -128,9 +131,10 @@ def least_strain(
             bounds = stretch.bounds(edges.vectors(points))
             before = model.value(points, bounds)
             gradient, hessian = model.derivatives(points, bounds)
-            matrix = _with_pattern_of(_regularised(hessian), matrix)
+            matrix = _with_pattern_of(_regularised(hessian[moving][:, moving]), matrix)
             factor = factorize(matrix, factor)
-            step = -factor.solve(gradient)
+            step = np.zeros(gradient.size)
+            step[moving] = -factor.solve(gradient[moving])
             slope, step = float(gradient @ step), step.reshape(-1, 2)
             length = _step_length(model, points, bounds, step, slope)
             points = points + length * step
