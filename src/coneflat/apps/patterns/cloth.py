@@ -6,15 +6,16 @@ the nearest seam relax them. The energy is varied, and the shortest seams are ke
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from ... import TriangleMesh, unwrap
-from ...base import BoolArray, FloatArray, IntArray, Unmet, mask_of, plural
+from ...base import BoolArray, FloatArray, IntArray, Unmet, has_any, mask_of, plural
 from ...geometry import angle_defect, corner_angles, edge_lengths
 from ...linalg.shortest_paths import MultiGraph
-from ...mesh import label_components
+from ...mesh import label_components, nearby
 from .borders import find_borders
 from .cut_surface import CutSurface
 from .development import Development
@@ -33,9 +34,11 @@ ENERGY_PER_STRAIN = 3.0
 # Textures that are tried: with twice the energy as long as seams get shorter, or half of it if the strain is too large.
 TEXTURES = 5
 # Fraction of edges beyond the bound above which the seams of a texture are too few, so that slits cannot help.
-MAX_STRAINED = 0.5
+MAX_STRAINED = 0.15
+# Rings of triangles around new cuts whose points move.
+RINGS = 16
 # Rounds of slits, each at the worst vertex of every strained region.
-ROUNDS = 12
+ROUNDS = 16
 
 
 def cloth_pieces(mesh: TriangleMesh, options: PatternOptions) -> Development:
@@ -122,11 +125,12 @@ def slit_until_within(surface: CutSurface, stretch: Stretch) -> CutSurface:
     the largest one.
     """
     even = relaxed(surface, stretch, EVEN)
+    flat = relaxed(even, stretch, SMALLEST)
     for _ in range(ROUNDS):
-        flat = without_overlaps(relaxed(even, stretch, SMALLEST))
-        if len(flat.seams) > len(even.seams):
-            even = relaxed(even.cut_along(flat.seams, flat.places), stretch, EVEN[-1:])
-            flat = relaxed(even, stretch, SMALLEST)
+        separated = without_overlaps(flat)
+        if separated is not flat:
+            even = even.cut_along(separated.seams, separated.places)
+            even, flat = _relaxed_near(even, even, np.setdiff1d(separated.seams, flat.seams), stretch)
         closed = closed_seams(flat)
         beyond = excess(closed, stretch)
         if not beyond.any() or (beyond > 0).mean() > MAX_STRAINED:
@@ -134,8 +138,28 @@ def slit_until_within(surface: CutSurface, stretch: Stretch) -> CutSurface:
         tips = _worst_vertices(even, excess(even, stretch), beyond > 0)
         if not len(tips):
             break
-        even = relaxed(even.cut_along(_with_slits(even, tips)), stretch, EVEN[-1:])
+        slits = _slits(even, tips)
+        cut = [layout.cut_along(np.union1d(layout.seams, slits)) for layout in (even, flat)]
+        even, flat = _relaxed_near(*cut, slits, stretch)
     return closed
+
+
+def _relaxed_near(
+    even: CutSurface, flat: CutSurface, cuts: IntArray, stretch: Stretch
+) -> tuple[CutSurface, CutSurface]:
+    """Return both layouts of a surface relaxed around new cuts (k,), the second from the first one there.
+
+    Args:
+        even: the layout in which strain is evened out moderately.
+        flat: the layout with the smallest largest strain.
+        cuts: edges of the mesh.
+        stretch: what the material allows.
+    """
+    is_cut = mask_of(len(even.mesh.vertices), even.mesh.edges[cuts])
+    is_free = nearby(even.corners, has_any(is_cut, even.mesh.faces), RINGS)
+    even = relaxed(even, stretch, EVEN[-1:], is_free)
+    start = replace(flat, points=np.where(is_free[:, None], even.points, flat.points))
+    return even, relaxed(start, stretch, SMALLEST, is_free)
 
 
 def _worst_vertices(surface: CutSurface, beyond: FloatArray, remains: BoolArray) -> IntArray:
@@ -186,9 +210,9 @@ def _inner_neighbours(mesh: TriangleMesh, is_border: BoolArray, vertices: IntArr
     return ends[~is_border[ends]]
 
 
-def _with_slits(surface: CutSurface, tips: IntArray) -> IntArray:
-    """Return the seams of a surface and cuts from each tip to the nearest seam or border."""
+def _slits(surface: CutSurface, tips: IntArray) -> IntArray:
+    """Return the edges on the way from the tips to the nearest seam or border."""
     mesh = surface.mesh
     graph = MultiGraph(len(mesh.vertices), mesh.edges, surface.edge_lengths, mesh.incident_edges)
     paths = graph.shortest_paths(np.flatnonzero(surface.is_border_vertex))
-    return np.union1d(surface.seams, paths.edge[paths.nodes_to(tips)])
+    return paths.edge[paths.nodes_to(tips)]

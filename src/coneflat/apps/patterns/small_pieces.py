@@ -6,7 +6,7 @@ import numpy as np
 
 from ...base import FloatArray, mask_of
 from ...geometry import signed_double_areas
-from ...mesh.connectivity import nearby
+from ...mesh import nearby
 from .borders import Seam, find_borders
 from .cut_surface import CutSurface
 from .relaxing import EVEN, SMALLEST, closed_seams, excess, relaxed
