@@ -9,7 +9,7 @@ import numpy as np
 
 from ...base import FloatArray, plural
 from .drawing import Drawing, Text
-from .finish import SEWN, Finish
+from .finish import Finish
 from .pages import Page, Picture, cut_shapes, page_map, ruler
 from .papers import IN_INCHES, MARGIN, OVERLAP, Paper
 from .report import piece_sizes
@@ -84,9 +84,12 @@ def _pictures(pattern: Pattern, width: float, height: float, top: float) -> tupl
     pixels = round(PIXELS * each), round(PIXELS * height)
     pictures: list[Picture] = []
     texts: list[Text] = []
-    for i, apart in enumerate((False, True)):
+    # A single piece is shown from behind instead of moved apart.
+    behind = 2 * (eye @ up) * up - eye
+    second = (behind, False) if pattern.piece_count == 1 else (eye, True)
+    for i, (direction, apart) in enumerate(((eye, False), second)):
         low = np.array([MARGIN + i * (each + SPACE), top - height])
-        view = view_of(pattern.surface, pixels, eye, up, apart)
+        view = view_of(pattern.surface, pixels, direction, up, apart)
         pictures.append(Picture(view.pixels, low, each, height))
         texts += _numbers(view, low, each, height)
     return pictures, texts
@@ -119,7 +122,7 @@ def _summary(pattern: Pattern) -> list[str]:
 def _how_to_read(pattern: Pattern) -> Iterator[str]:
     """Yield what the lines and texts mean."""
     yield "A (2) at a side: this is seam A, and piece 2 is on the other side of it. Solid black lines are cut."
-    if pattern.kind in SEWN:
+    if pattern.is_sewn:
         yield (
             "Grey dashed lines are sewn. Notches match on both sides of a seam; the double one is the same on both. "
             "The arrow is the grain."
@@ -188,7 +191,7 @@ def _seam_tables(pattern: Pattern) -> Iterator[Table]:
         first, second = (side.piece + 1 for side in seam.sides)
         pieces = (
             f"dart in {first}"
-            if seam.is_dart
+            if seam in pattern.darts
             else f"{first} and {second}"
             if first != second
             else f"{first}, itself"

@@ -13,7 +13,7 @@ from .allowances import shapely
 from .drawing import Text
 
 if TYPE_CHECKING:
-    from shapely import Polygon
+    from shapely import LineString, Polygon
 
 # Mean width of a character of Helvetica, and height of a line of text with what is below its base line, both relative
 # to the height of capitals; rather too large than too small.
@@ -27,21 +27,24 @@ class Labels:
     Attributes:
         shape: the shape inside which they must be.
         boxes: what is already covered.
+        lines: lines that texts cross only where there is no other place.
         texts: the texts that have been placed.
     """
 
     shape: Polygon
     boxes: list[Polygon] = field(default_factory=list)
+    lines: list[LineString] = field(default_factory=list)
     texts: list[Text] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         shapely().prepare(self.shape)
 
-    def is_free(self, box: Polygon) -> bool:
-        """Return whether a shape is inside and covers nothing."""
+    def is_free(self, box: Polygon, crosses_lines: bool = True) -> bool:
+        """Return whether a shape is inside and covers nothing; crosses_lines: it may cross lines."""
         if not self.shape.contains(box):
             return False
-        return not self.boxes or not shapely().intersects(np.array(self.boxes), box).any()
+        obstacles = self.boxes if crosses_lines else [*self.boxes, *self.lines]
+        return not obstacles or not shapely().intersects(np.array(obstacles), box).any()
 
     def cover(self, shape: Polygon) -> None:
         """Let no text be placed on a shape."""
@@ -49,12 +52,13 @@ class Labels:
 
     def add(self, candidates: Iterable[Text]) -> Text | None:
         """Place the first of some texts that has room, and return it; None if none has."""
-        for text in candidates:
-            box = box_of(text)
-            if self.is_free(box):
-                self.cover(box)
-                self.texts.append(text)
-                return text
+        boxes = [(text, box_of(text)) for text in candidates]
+        for crosses_lines in (False, True) if self.lines else (True,):
+            for text, box in boxes:
+                if self.is_free(box, crosses_lines):
+                    self.cover(box)
+                    self.texts.append(text)
+                    return text
         return None
 
 

@@ -14,7 +14,7 @@ from ...errors import OptionError
 from ...geometry import rotated_up, signed_double_areas
 from .allowances import shapely
 from .cut_surface import CutSurface
-from .finish import SEWN, Finish
+from .finish import Finish
 from .labels import rotated
 from .papers import EDGE, OVERLAP, Paper
 from .result import Pattern
@@ -71,7 +71,7 @@ def nested(pattern: Pattern) -> Pattern:
     shapes = piece_shapes(
         pattern.surface, pattern.borders, Finish.of(pattern.kind, pattern.settings), pattern.tabs
     )
-    pieces = _Pieces(_outlines(shapes), _angles(shapes, pattern.kind in SEWN))
+    pieces = _Pieces(_outlines(shapes), _angles(shapes, pattern.is_sewn))
     return _moved(pattern, _packed(pieces, shapes, paper))
 
 

@@ -9,14 +9,14 @@ import numpy as np
 
 from ...base import IntArray
 from .allowances import shapely
-from .borders import Seam, Side
 from .drawing import Drawing, Line, Text
-from .finish import HEM, SEWN, Finish
+from .finish import HEM, Finish
 from .labels import Labels
 from .notches import notches_of
 from .papers import EDGE
 from .piece_texts import add_angle, add_grain, add_number, add_seam_name
 from .result import Pattern
+from .seam_names import names_of
 from .shapes import PieceShape, piece_shapes
 
 # Dashes and gaps, mm: seam lines, folds away from the eye (mountains) and towards it (valleys).
@@ -37,19 +37,18 @@ def drawing_of(pattern: Pattern) -> Drawing:
     lines += [*_notch_lines(pattern, finish), *_dart_tips(pattern)]
     width, height = np.max([shape.cut.bounds[2:] for shape in shapes], axis=0) + EDGE
     rooms = Rooms.of(shapes, float(width), float(height))
+    points, piece_of_point = pattern.surface.points, _piece_of_points(pattern)
+    for ends in pattern.folds:
+        rooms.inside[piece_of_point[ends[0]]].lines.append(shapely().LineString(points[ends]))
     for piece, room in enumerate(rooms.inside):
         lines += add_number(room, rooms.outside, piece, shapes[piece].inside.area)
-        if pattern.kind in SEWN:
+        if pattern.is_sewn:
             lines += add_grain(room)
     for seam in sorted(pattern.seams, key=lambda seam: -min(seam.lengths)):
-        for side, partner in (seam.sides, seam.sides[::-1]):
-            name = name_of_side(seam, side, partner)
-            add_seam_name(
-                rooms.at(side.piece), name, pattern.surface.points[side.points], finish.width(seam.name)
-            )
-    piece_of_point = _piece_of_points(pattern)
+        for name in names_of(pattern.kind, seam, points):
+            add_seam_name(rooms.at(name.piece), name.text, name.line, finish.width(seam.name))
     for ends, angle in zip(pattern.folds, pattern.fold_angles, strict=True):
-        add_angle(rooms.inside[piece_of_point[ends[0]]], pattern.surface.points[ends], float(angle))
+        add_angle(rooms.inside[piece_of_point[ends[0]]], points[ends], float(angle))
     return Drawing(float(width), float(height), tuple(lines), tuple(rooms.texts()))
 
 
@@ -81,16 +80,6 @@ class Rooms:
             yield from room.texts
 
 
-def name_of_side(seam: Seam, side: Side, partner: Side) -> str:
-    """Return the text at a side of a seam: its name, the number of the piece to which it is sewn, and its ease."""
-    if seam.is_dart:
-        return f"dart {seam.name}"
-    is_first = side is seam.sides[0]
-    length, length_there = seam.lengths if is_first else seam.lengths[::-1]
-    ease = f", ease {length - length_there:.1f} mm" if seam.is_eased and length > length_there else ""
-    return f"{seam.name} ({partner.piece + 1}){ease}"
-
-
 def _cut_lines(shapes: Sequence[PieceShape]) -> Iterator[Line]:
     return (Line("cut", ring, is_closed=True) for shape in shapes for ring in shape.cut_rings)
 
@@ -113,14 +102,14 @@ def _folds(pattern: Pattern) -> Iterator[Line]:
 
 
 def _notch_lines(pattern: Pattern, finish: Finish) -> Iterator[Line]:
-    for seam in pattern.seams if pattern.kind in SEWN else ():
+    for seam in pattern.seams if pattern.is_sewn else ():
         for notches in notches_of(seam, pattern.surface.points):
             for notch in notches:
                 yield from (Line("mark", ends) for ends in notch.lines(finish.width(seam.name)))
 
 
 def _dart_tips(pattern: Pattern) -> Iterator[Line]:
-    """Yield a circle and a cross at the tip of each dart."""
+    """Yield a circle and a cross at the tip of each dart; nets and sheets have none, where the sides are glued."""
     angles = 2 * np.pi * np.arange(TIP_SIDES) / TIP_SIDES
     circle = TIP_RADIUS * np.stack([np.cos(angles), np.sin(angles)], axis=1)
     across = TIP_RADIUS * np.array([[-1.0, 0.0], [1.0, 0.0]])

@@ -35,7 +35,7 @@ def report_of(pattern: Pattern) -> dict[str, Any]:
             "lengths": list(seam.lengths),
             "surface_length": seam.surface_length,
             "ease": seam.ease if seam.is_eased else 0.0,
-            "is_dart": seam.is_dart,
+            "is_dart": seam in pattern.darts,
         }
         for seam in pattern.seams
     ]

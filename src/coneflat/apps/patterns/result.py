@@ -15,6 +15,7 @@ from ...base import EntryPoint, FloatArray, IntArray
 from .borders import Borders, Seam, find_borders
 from .cut_surface import CutSurface
 from .drawing import Drawing
+from .finish import SEWN
 from .shapes import Tab
 
 _DRAWING = EntryPoint[Drawing]("apps.patterns.outlines:drawing_of")
@@ -58,14 +59,19 @@ class Pattern:
         return len(self.borders.loops)
 
     @property
+    def is_sewn(self) -> bool:
+        """Whether it is a pattern for cloth, with seam allowances, notches, darts and a grain."""
+        return self.kind in SEWN
+
+    @property
     def seams(self) -> tuple[Seam, ...]:
         """The seams between different pieces or parts of pieces, darts among them."""
         return self.borders.seams
 
     @property
     def darts(self) -> tuple[Seam, ...]:
-        """The seams that end in a tip inside a piece."""
-        return tuple(seam for seam in self.seams if seam.is_dart)
+        """The seams that end in a tip inside a piece; none in nets and sheets, which are not sewn."""
+        return tuple(seam for seam in self.seams if seam.is_dart and self.is_sewn)
 
     @cached_property
     def strains(self) -> FloatArray:

@@ -13,6 +13,8 @@ from .labels import text_width
 
 # Height of a row, of its text and of headings, and distance of tables, mm.
 ROW, SIZE, HEADING, SPACE = 4.6, 2.1, 3.2, 8.0
+# Smallest number of rows of a part of a table.
+MIN_ROWS = 3
 # Space between columns, mm.
 COLUMN_SPACE = 4.0
 
@@ -50,24 +52,23 @@ def laid_out(
         low, high: (2,) the corners of the part of a page that may be used, mm.
     """
     pages: list[tuple[list[Line], list[Text]]] = [([], [])]
-    left, top = float(low[0]), float(high[1])
+    left, top, widest = float(low[0]), float(high[1]), 0.0
     for table in tables:
         width, rows = sum(table.widths), list(table.rows)
+        widest = max(width, widest if top < high[1] else 0.0)
         while rows:
             room = int((top - low[1] - HEADING - 3 * ROW) / ROW)
             if left + width > high[0] + 1e-6 and left > low[0]:
                 pages.append(([], []))
                 left, top = float(low[0]), float(high[1])
                 continue
-            if room < min(len(rows), 3):
-                left, top = left + width + SPACE, float(high[1])
+            if room < min(len(rows), MIN_ROWS):
+                left, top, widest = left + widest + SPACE, float(high[1]), width
                 continue
             part, rows = rows[:room], rows[room:]
             lines, texts = pages[-1]
             bottom = _draw(table, part, left, top, lines, texts)
             top = bottom - SPACE
-        # The next table is wider or narrower: it begins beside this one if it does not fit below.
-        left, top = left + width + SPACE, float(high[1])
     return pages
 
 
