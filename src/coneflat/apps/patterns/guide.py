@@ -121,7 +121,10 @@ def _summary(pattern: Pattern) -> list[str]:
 
 def _how_to_read(pattern: Pattern) -> Iterator[str]:
     """Yield what the lines and texts mean."""
-    yield "A (2) at a side: this is seam A, and piece 2 is on the other side of it. Solid black lines are cut."
+    if pattern.piece_count > 1:
+        yield "A (2) at a side: this is seam A, and piece 2 is on the other side of it. Solid black lines are cut."
+    else:
+        yield "Sides with the same name meet. Solid black lines are cut."
     if pattern.is_sewn:
         yield (
             "Grey dashed lines are sewn. Notches match on both sides of a seam; the double one is the same on both. "

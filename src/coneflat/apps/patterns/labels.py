@@ -39,26 +39,33 @@ class Labels:
     def __post_init__(self) -> None:
         shapely().prepare(self.shape)
 
-    def is_free(self, box: Polygon, crosses_lines: bool = True) -> bool:
-        """Return whether a shape is inside and covers nothing; crosses_lines: it may cross lines."""
-        if not self.shape.contains(box):
-            return False
+    def is_free(self, box: Polygon, crosses_lines: bool = False) -> bool:
+        """Return whether a shape is inside and covers nothing.
+
+        Args:
+            box: the shape.
+            crosses_lines: whether it may cross lines.
+        """
         obstacles = self.boxes if crosses_lines else [*self.boxes, *self.lines]
-        return not obstacles or not shapely().intersects(np.array(obstacles), box).any()
+        return self.shape.contains(box) and not any(map(box.intersects, obstacles))
 
     def cover(self, shape: Polygon) -> None:
         """Let no text be placed on a shape."""
         self.boxes.append(shape)
 
-    def add(self, candidates: Iterable[Text]) -> Text | None:
-        """Place the first of some texts that has room, and return it; None if none has."""
-        boxes = [(text, box_of(text)) for text in candidates]
-        for crosses_lines in (False, True) if self.lines else (True,):
-            for text, box in boxes:
-                if self.is_free(box, crosses_lines):
-                    self.cover(box)
-                    self.texts.append(text)
-                    return text
+    def add(self, candidates: Iterable[Text], crosses_lines: bool = False) -> Text | None:
+        """Place the first of some texts that has room, and return it; None if none has.
+
+        Args:
+            candidates: the texts.
+            crosses_lines: whether texts may cross lines.
+        """
+        for text in candidates:
+            box = box_of(text)
+            if self.is_free(box, crosses_lines):
+                self.cover(box)
+                self.texts.append(text)
+                return text
         return None
 
 

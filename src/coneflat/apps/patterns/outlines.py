@@ -45,7 +45,7 @@ def drawing_of(pattern: Pattern) -> Drawing:
         if pattern.is_sewn:
             lines += add_grain(room)
     for seam in sorted(pattern.seams, key=lambda seam: -min(seam.lengths)):
-        for name in names_of(pattern.kind, seam, points):
+        for name in names_of(pattern.kind, seam, points, is_single=pattern.piece_count == 1):
             add_seam_name(rooms.at(name.piece), name.text, name.line, finish.width(seam.name))
     for ends, angle in zip(pattern.folds, pattern.fold_angles, strict=True):
         add_angle(rooms.inside[piece_of_point[ends[0]]], points[ends], float(angle))

@@ -14,6 +14,8 @@ from .labels import LINE_HEIGHT, Labels, text_width, upright
 from .notches import distances
 from .units import area_text
 
+# Factors of the height of a number that stands alone.
+NUMBER_FACTORS = (1.6, 1.2, 1.0, 0.75, 0.5)
 # Heights of capitals, mm, the largest that has room is chosen: numbers of pieces, relative to the largest circle in a
 # piece and at most; what stands below them; names of seams; angles of folds.
 NUMBER_PER_RADIUS, MAX_NUMBER, BELOW_NUMBER = 0.35, 9.0, 0.4
@@ -44,27 +46,25 @@ def add_number(room: Labels, outside: Labels, piece: int, area: float) -> Iterat
     below = max(BELOW_NUMBER * size, MIN_TEXT)
     number, details = str(piece + 1), f"cut 1 \u00b7 {area_text(area)}"
     step = LINE_HEIGHT * (size + below) / 2
-    if np.hypot(step, text_width(details, below) / 2) <= radius:
-        room.add([Text(number, centre + np.array([0.0, 0.4 * step]), size)])
-        room.add([Text(details, centre - np.array([0.0, 0.7 * step]), below)])
-    elif (
-        room.add(
-            [
-                Text(number, centre, size * factor)
-                for factor in (1.6, 1.2, 1.0, 0.75, 0.5)
-                if size * factor >= MIN_TEXT
-            ]
-        )
-        is None
-    ):
-        text = outside.add(
-            Text(number, centre + (radius + distance) * direction, OUTSIDE_NUMBER)
-            for distance, direction in product(OUTSIDE_DISTANCES, _directions())
-        )
-        if text is not None:
-            away = text.place - centre
-            end = centre + away * (1 - OUTSIDE_NUMBER / np.linalg.norm(away))
-            yield Line("mark", np.array([centre, end]))
+    has_block = np.hypot(step, text_width(details, below) / 2) <= radius
+    sizes = [size * factor for factor in NUMBER_FACTORS if size * factor >= MIN_TEXT]
+    for crosses_lines in (False, True):
+        if has_block:
+            block = Text(number, centre + np.array([0.0, 0.4 * step]), size)
+            if room.add([block], crosses_lines):
+                below_block = centre - np.array([0.0, 0.7 * step])
+                room.add([Text(details, below_block, below)], crosses_lines)
+                return
+        if room.add([Text(number, centre, factored) for factored in sizes], crosses_lines):
+            return
+    text = outside.add(
+        Text(number, centre + (radius + distance) * direction, OUTSIDE_NUMBER)
+        for distance, direction in product(OUTSIDE_DISTANCES, _directions())
+    )
+    if text is not None:
+        away = text.place - centre
+        end = centre + away * (1 - OUTSIDE_NUMBER / np.linalg.norm(away))
+        yield Line("mark", np.array([centre, end]))
 
 
 def _directions() -> FloatArray:
@@ -123,7 +123,8 @@ def add_seam_name(rooms: tuple[Labels, Labels, Labels], name: str, side: FloatAr
     _ = (
         inside.add(texts(SEAM_SIZES, INWARD))
         or allowance.add(texts(sizes, (0.0,), -width / 2))
-        or outside.add(texts(SEAM_SIZES[1:], (-INWARD[0], -INWARD[1], -3.0), -width))
+        or outside.add(texts(SEAM_SIZES[2:], (-INWARD[0], -INWARD[1], -3.0), -width))
+        or inside.add(texts(SEAM_SIZES[2:], INWARD), crosses_lines=True)
     )
 
 

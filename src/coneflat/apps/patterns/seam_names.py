@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -30,7 +31,7 @@ class SeamName:
     line: FloatArray
 
 
-def names_of(kind: str, seam: Seam, points: FloatArray) -> Iterator[SeamName]:
+def names_of(kind: str, seam: Seam, points: FloatArray, is_single: bool) -> Iterator[SeamName]:
     """Yield the names at both sides of a seam.
 
     Where a pattern is not sewn, each straight part of a seam has its name, such as A1, A2.
@@ -39,30 +40,31 @@ def names_of(kind: str, seam: Seam, points: FloatArray) -> Iterator[SeamName]:
         kind: the kind of the pattern.
         seam: the seam.
         points: (u, 2) the points of the pieces.
+        is_single: whether there is only one piece, whose number is left out.
     """
     if kind in SEWN:
         for side, partner in (seam.sides, seam.sides[::-1]):
-            text = _name_of_side(seam, side, partner)
+            text = _name_of_side(seam, side, "" if is_single else f" ({partner.piece + 1})")
             yield SeamName(text, side.piece, points[side.points])
         return
     first, second = (points[side.points] for side in seam.sides)
     ends = _ends_of_parts(first, second[::-1])
-    for i, (begin, end) in enumerate(zip(ends[:-1], ends[1:], strict=True)):
+    for i, (begin, end) in enumerate(pairwise(ends.tolist())):
         name = f"{seam.name}{i + 1}" if len(ends) > 2 else seam.name
         back = slice(len(second) - 1 - end, len(second) - begin)
         for side, partner, line in (
             (*seam.sides, first[begin : end + 1]),
             (*seam.sides[::-1], second[back]),
         ):
-            yield SeamName(f"{name} ({partner.piece + 1})", side.piece, line)
+            yield SeamName(name if is_single else f"{name} ({partner.piece + 1})", side.piece, line)
 
 
-def _name_of_side(seam: Seam, side: Side, partner: Side) -> str:
+def _name_of_side(seam: Seam, side: Side, partner: str) -> str:
     if seam.is_dart:
         return f"dart {seam.name}"
     length, length_there = seam.lengths if side is seam.sides[0] else seam.lengths[::-1]
     ease = f", ease {length - length_there:.1f} mm" if seam.is_eased and length > length_there else ""
-    return f"{seam.name} ({partner.piece + 1}){ease}"
+    return f"{seam.name}{partner}{ease}"
 
 
 def _ends_of_parts(first: FloatArray, second: FloatArray) -> IntArray:
