@@ -132,7 +132,7 @@ def _how_to_read(pattern: Pattern) -> Iterator[str]:
         )
     if pattern.darts:
         yield "A dart is sewn together along its two sides, from the border to its tip, which is marked by a circle."
-    if len(pattern.folds) or pattern.tabs:
+    if len(pattern.folds) or pattern.bends or pattern.tabs:
         yield (
             "Blue lines are folded: away from you where dash-dotted (mountains), towards you where dashed (valleys), "
             "by the angle that is written there."

@@ -14,6 +14,7 @@ import numpy as np
 from ...base import EntryPoint, FloatArray, IntArray
 from .borders import Borders, Seam, find_borders
 from .cut_surface import CutSurface
+from .development import Bend
 from .drawing import Drawing
 from .finish import SEWN
 from .shapes import Tab
@@ -34,6 +35,7 @@ class Pattern:
         millimetres: millimetres per unit of the model.
         folds: (f, 2) points of fold lines inside pieces, and `fold_angles` (f,) their dihedral angles in radians,
             positive for mountain folds, negative for valleys.
+        bends: bends of a sheet.
         tabs: tabs for glue, beside the pieces.
         notes: what could not be met, one sentence each.
         settings: the options.
@@ -44,6 +46,7 @@ class Pattern:
     millimetres: float
     folds: IntArray = field(default_factory=lambda: np.empty((0, 2), dtype=np.int64))
     fold_angles: FloatArray = field(default_factory=lambda: np.empty(0))
+    bends: tuple[Bend, ...] = ()
     tabs: tuple[Tab, ...] = ()
     notes: tuple[str, ...] = ()
     settings: Mapping[str, Any] = field(default_factory=dict)
