@@ -59,7 +59,6 @@ _HOMES = {
     "QuadMesh": "quadmesh.quad_mesh",
     "measure_quads": "quadmesh.quality",
     "integer_grid": "quadmesh.quad_meshing",
-    "Pattern": "apps.patterns.result",
     "IntegerGrid": "quadmesh.integer_map",
     "make_figure": "apps.view",
     "save_figure": "apps.view",
@@ -127,8 +126,8 @@ if TYPE_CHECKING:
         seams,
         stages,
     )
-    from .apps.studio.notebook import studio
     from .apps.patterns.result import Pattern
+    from .apps.studio.notebook import studio
     from .apps.uv_measures import measure_uv
     from .apps.view import make_figure, save_figure
     from .curves import ConeCurve, cone_curve, find_cones

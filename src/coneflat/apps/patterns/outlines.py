@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...base import IntArray
+from ...base import FloatArray, IntArray
 from .allowances import shapely
 from .drawing import Drawing, Line, Text
 from .finish import HEM, Finish
@@ -34,10 +34,16 @@ def drawing_of(pattern: Pattern) -> Drawing:
     finish = Finish.of(pattern.kind, pattern.settings)
     shapes = piece_shapes(pattern.surface, pattern.borders, finish, pattern.tabs)
     lines = [*_cut_lines(shapes), *_seam_lines(pattern, finish), *_tab_folds(pattern), *_folds(pattern)]
-    lines += [*_notch_lines(pattern, finish), *_dart_tips(pattern)]
+    lines += [Line("mark", ends) for _, ends in _notches(pattern, finish)]
+    lines += _dart_tips(pattern)
     width, height = np.max([shape.cut.bounds[2:] for shape in shapes], axis=0) + EDGE
     rooms = Rooms.of(shapes, float(width), float(height))
     points, piece_of_point = pattern.surface.points, _piece_of_points(pattern)
+    for dart in pattern.darts:
+        rooms.inside[dart.sides[0].piece].cover(shapely().Point(points[dart.tip]).buffer(TIP_RADIUS))
+    for piece, ends in _notches(pattern, finish):
+        for room in (rooms.inside[piece], rooms.allowances[piece]):
+            room.cover(shapely().LineString(ends))
     for ends in pattern.folds:
         rooms.inside[piece_of_point[ends[0]]].lines.append(shapely().LineString(points[ends]))
     for piece, room in enumerate(rooms.inside):
@@ -106,11 +112,12 @@ def _folds(pattern: Pattern) -> Iterator[Line]:
         yield Line("fold", bend.line, dashes=MOUNTAIN if bend.angle > 0 else VALLEY)
 
 
-def _notch_lines(pattern: Pattern, finish: Finish) -> Iterator[Line]:
+def _notches(pattern: Pattern, finish: Finish) -> Iterator[tuple[int, FloatArray]]:
+    """Yield the lines (2, 2) of notches, and their pieces."""
     for seam in pattern.seams if pattern.is_sewn else ():
-        for notches in notches_of(seam, pattern.surface.points):
+        for side, notches in zip(seam.sides, notches_of(seam, pattern.surface.points), strict=True):
             for notch in notches:
-                yield from (Line("mark", ends) for ends in notch.lines(finish.width(seam.name)))
+                yield from ((side.piece, ends) for ends in notch.lines(finish.width(seam.name)))
 
 
 def _dart_tips(pattern: Pattern) -> Iterator[Line]:
