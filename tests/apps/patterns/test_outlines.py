@@ -25,7 +25,7 @@ SQUARE = np.array([[0.0, 0], [100, 0], [100, 100], [0, 100]])
 CORNER = np.array([[0.0, 0], [100, 0], [100, 40], [40, 40], [40, 100], [0, 100]])
 
 
-def same(ring, width):
+def uniform(ring, width):
     return np.full(len(ring), float(width))
 
 
@@ -42,14 +42,14 @@ def lengths_of(lines):
 
 
 def test_a_mitred_allowance_has_the_area_of_its_strips_and_corners():
-    assert widened([SQUARE], [same(SQUARE, 7)]).area == pytest.approx(114**2)
+    assert widened([SQUARE], [uniform(SQUARE, 7)]).area == pytest.approx(114**2)
     # Five corners add a square, and one takes it away.
     expected = 6400 + 400 * 5 + 4 * 25
-    assert widened([CORNER], [same(CORNER, 5)]).area == pytest.approx(expected)
+    assert widened([CORNER], [uniform(CORNER, 5)]).area == pytest.approx(expected)
 
 
 def test_a_round_allowance_has_the_area_of_its_strips_and_arcs():
-    area = widened([SQUARE], [same(SQUARE, 7)], is_round=True).area
+    area = widened([SQUARE], [uniform(SQUARE, 7)], is_round=True).area
     assert area == pytest.approx(100**2 + 400 * 7 + np.pi * 49, rel=1e-5)
 
 
@@ -61,10 +61,10 @@ def test_single_seams_have_allowances_of_their_own():
 
 def test_a_hole_becomes_narrower():
     hole = (SQUARE * 0.4 + 30)[::-1]
-    wide = widened([SQUARE, hole], [same(SQUARE, 0), same(hole, 6)])
+    wide = widened([SQUARE, hole], [uniform(SQUARE, 0), uniform(hole, 6)])
     assert wide.area == pytest.approx(100**2 - 28**2)
     assert len(wide.interiors) == 1
-    assert not widened([SQUARE, hole], [same(SQUARE, 0), same(hole, 25)]).interiors
+    assert not widened([SQUARE, hole], [uniform(SQUARE, 0), uniform(hole, 25)]).interiors
 
 
 @pytest.mark.parametrize("is_round", [True, False])
@@ -73,7 +73,7 @@ def test_an_allowance_is_nowhere_too_narrow_and_corners_are_trimmed(is_round):
     angles = np.sort(rng.random(60)) * 2 * np.pi
     ring = (50 + 30 * rng.random(60))[:, None] * np.stack([np.cos(angles), np.sin(angles)], axis=1)
     piece = polygon_of([ring])
-    wide = widened([ring], [same(ring, 6)], is_round)
+    wide = widened([ring], [uniform(ring, 6)], is_round)
     # Chords of arcs are a little inside of them.
     assert wide.buffer(0.06).contains(piece.buffer(6))
     # A trimmed corner ends twice as far out, over the whole width of both allowances.
@@ -84,7 +84,7 @@ def test_pockets_between_allowances_are_filled():
     outside = [[0.0, 0], [60, 0], [60, 60], [31, 60]]
     around_pocket = [[31, 50], [50, 50], [50, 10], [10, 10], [10, 50], [29, 50]]
     ring = np.array([*outside, *around_pocket, [29, 60], [0, 60]])
-    wide = widened([ring], [same(ring, 2)])
+    wide = widened([ring], [uniform(ring, 2)])
     assert not wide.interiors
     assert wide.area == pytest.approx(64 * 64)
 
@@ -277,8 +277,8 @@ def test_the_grain_points_up():
     surface = sheet()
     angle = 0.7
     turned = surface.points @ np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
-    upright = grain_up(replace(surface, points=turned), np.array([0.0, 1.0, 0.0]))
-    flat = upright.points - upright.points.mean(axis=0)
+    turned_up = grain_up(replace(surface, points=turned), np.array([0.0, 1.0, 0.0]))
+    flat = turned_up.points - turned_up.points.mean(axis=0)
     assert flat == pytest.approx(surface.points - surface.points.mean(axis=0), abs=1e-9)
 
 

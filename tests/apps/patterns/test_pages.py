@@ -89,10 +89,10 @@ def test_each_point_of_a_line_is_visible_on_a_page_at_its_true_size():
                 seen[shift] = shapely.transform(
                     shapely.intersection(ring, shapely.box(*low, *high)), lambda points, s=shift: points + s
                 )
-    whole = shapely.LinearRing(drawing.lines[0].points)
+    border = shapely.LinearRing(drawing.lines[0].points)
     joined = shapely.union_all(list(seen.values()))
     assert len(seen) == 4
-    assert joined.hausdorff_distance(whole) < 1e-6
+    assert joined.hausdorff_distance(border) < 1e-6
 
 
 def test_rulers_have_their_length():

@@ -80,18 +80,18 @@ def _pictures(pattern: Pattern, width: float, height: float, top: float) -> tupl
     """Return the pictures of the model and of its pieces moved apart, with their numbers."""
     axis = pattern.settings.get("axis")
     eye, up = eye_and_up(pattern.surface, None if axis is None else np.asarray(axis))
-    each = (width - SPACE) / 2
-    pixels = round(PIXELS * each), round(PIXELS * height)
+    picture_width = (width - SPACE) / 2
+    pixels = round(PIXELS * picture_width), round(PIXELS * height)
     pictures: list[Picture] = []
     texts: list[Text] = []
     # A single piece is shown from behind instead of moved apart.
     behind = 2 * (eye @ up) * up - eye
     second = (behind, False) if pattern.piece_count == 1 else (eye, True)
     for i, (direction, apart) in enumerate(((eye, False), second)):
-        low = np.array([MARGIN + i * (each + SPACE), top - height])
+        low = np.array([MARGIN + i * (picture_width + SPACE), top - height])
         view = view_of(pattern.surface, pixels, direction, up, apart)
-        pictures.append(Picture(view.pixels, low, each, height))
-        texts += _numbers(view, low, each, height)
+        pictures.append(Picture(view.pixels, low, picture_width, height))
+        texts += _numbers(view, low, picture_width, height)
     return pictures, texts
 
 
@@ -181,8 +181,8 @@ def _pages_of_pieces(pattern: Pattern, drawing: Drawing, paper: Paper) -> list[s
     for piece in range(pattern.piece_count):
         points = surface.points[np.unique(surface.corners[surface.pieces == piece])]
         low, high = points.min(axis=0), points.max(axis=0)
-        there = [tile.name for tile in tiles if (tile.low < high).all() and (tile.high > low).all()]
-        names.append(there[0] if len(there) == 1 else f"{there[0]} to {there[-1]}" if there else "")
+        tile_names = [tile.name for tile in tiles if (tile.low < high).all() and (tile.high > low).all()]
+        names.append(" to ".join(dict.fromkeys([*tile_names[:1], *tile_names[-1:]])))
     return names
 
 

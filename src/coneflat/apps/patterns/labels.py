@@ -87,8 +87,8 @@ def rotated(points: FloatArray, angle: float) -> FloatArray:
     return points @ np.array([[cosine, sine], [-sine, cosine]])
 
 
-def upright(direction: FloatArray) -> float:
-    """Return the angle of a text along a direction (2,), radians, such that it is never upside down."""
+def readable_angle(direction: FloatArray) -> float:
+    """Return the angle of a text along a direction (2,), radians, such that it is read from below or from the right."""
     angle = float(np.arctan2(direction[1], direction[0]))
     if angle > np.pi / 2 + 1e-6:
         return angle - np.pi

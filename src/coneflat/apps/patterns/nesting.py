@@ -134,8 +134,8 @@ def _angles(shapes: Sequence[PieceShape], has_grain: bool) -> FloatArray:
 
 def _packed(pieces: _Pieces, shapes: Sequence[PieceShape], paper: Paper) -> SheetPacking:
     if paper.width is not None and paper.height is not None:
-        whole = pieces.pages(paper)
-        return _fewest_pages(pieces, shapes, paper) if whole is None else _pages_in_rows(whole, paper)
+        on_pages = pieces.pages(paper)
+        return _fewest_pages(pieces, shapes, paper) if on_pages is None else _pages_in_rows(on_pages, paper)
     if paper.width is not None:
         packing = pieces.strip(paper.inner_width)
         if packing is None:
@@ -159,10 +159,10 @@ def _strips(pieces: _Pieces, widths: Sequence[float]) -> Iterator[tuple[float, S
 def _fewest_pages(pieces: _Pieces, shapes: Sequence[PieceShape], paper: Paper) -> SheetPacking:
     """Return the pieces on a sheet of pages that overlap, of the width for which there are fewest pages."""
     step = paper.inner_width - OVERLAP
-    least = max(int(np.ceil((1.01 * pieces.narrowest + 2 * EDGE - OVERLAP) / step)), 1)
+    min_columns = max(int(np.ceil((1.01 * pieces.narrowest + 2 * EDGE - OVERLAP) / step)), 1)
     area = sum(shape.cut.area for shape in shapes)
-    square = max(round((1.2 * area) ** 0.5 / step), least)
-    counts = range(max(least, square - MORE_COLUMNS), square + MORE_COLUMNS + 1)
+    square = max(round((1.2 * area) ** 0.5 / step), min_columns)
+    counts = range(max(min_columns, square - MORE_COLUMNS), square + MORE_COLUMNS + 1)
     candidates = [packing for _, packing in _strips(pieces, [count * step + OVERLAP for count in counts])]
 
     def cost(packing: SheetPacking) -> tuple[int, float]:

@@ -92,9 +92,9 @@ def _draw(canvas: Any, drawing: Drawing) -> None:
 def _draw_line(canvas: Any, line: Line) -> None:
     canvas.setDash(list(line.dashes))
     path = canvas.beginPath()
-    first, *others = line.points.tolist()
+    first, *following = line.points.tolist()
     path.moveTo(*first)
-    for point in others:
+    for point in following:
         path.lineTo(*point)
     if line.is_closed:
         path.close()

@@ -10,7 +10,7 @@ import numpy as np
 from ...base import FloatArray
 from .allowances import shapely
 from .drawing import Line, Text
-from .labels import LINE_HEIGHT, Labels, text_width, upright
+from .labels import LINE_HEIGHT, Labels, text_width, readable_angle
 from .notches import distances
 from .units import area_text
 
@@ -29,7 +29,7 @@ ALONG, INWARD = (0.5, 0.42, 0.58, 0.33, 0.67, 0.22, 0.78, 0.12, 0.88), (1.1, 1.6
 # Longest and shortest grain line, and length of the arms of its arrows, mm; lengths and places of its middle that are
 # tried, as fractions of the length of the piece there.
 MAX_GRAIN, MIN_GRAIN, ARROW = 120.0, 10.0, 3.0
-GRAINS = ((0.7, 0.5), (0.35, 0.5), (0.3, 0.75), (0.3, 0.25), (0.15, 0.8), (0.15, 0.2))
+GRAINS = ((0.7, 0.5), (0.35, 0.5), (0.3, 0.75), (0.3, 0.25), (0.15, 0.7), (0.15, 0.3))
 # Accuracy of the centre of a piece, relative to the size of the piece.
 CENTRE_ACCURACY = 0.01
 
@@ -146,7 +146,7 @@ def _beside(name: str, side: FloatArray, along: FloatArray, share: float, size: 
     # A side that bulges towards the text is nearer to it than its chord.
     heights = (side[(along >= middle - half) & (along <= middle + half)] - place) @ normal
     bulge = max(float(heights.max(initial=0.0)), 0.0)
-    return Text(name, place + (bulge + abs(inward)) * normal, size, upright(direction))
+    return Text(name, place + (bulge + abs(inward)) * normal, size, readable_angle(direction))
 
 
 def add_angle(room: Labels, ends: FloatArray, angle: float, radius: float = 0.0) -> None:
@@ -157,7 +157,7 @@ def add_angle(room: Labels, ends: FloatArray, angle: float, radius: float = 0.0)
     direction = vector / length
     normal = np.array([-direction[1], direction[0]])
     room.add(
-        Text(text, ends[0] + share * vector + shift * size * normal, size, upright(direction))
+        Text(text, ends[0] + share * vector + shift * size * normal, size, readable_angle(direction))
         for size, shift, share in product(ANGLE_SIZES, (0.95, -0.95), (0.5, 0.35, 0.65))
         if text_width(text, size) <= length
     )
