@@ -10,7 +10,7 @@ import numpy as np
 from ...base import FloatArray
 from .allowances import shapely
 from .drawing import Line, Text
-from .labels import LINE_HEIGHT, Labels, text_width, readable_angle
+from .labels import LINE_HEIGHT, Labels, readable_angle, text_width
 from .notches import distances
 from .units import area_text
 
