@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator
+from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,31 +13,53 @@ from .allowances import shapely
 from .drawing import Text
 
 if TYPE_CHECKING:
-    from shapely import LineString, Polygon
+    from shapely import Geometry, LineString, Polygon
 
 # Mean width of a character of Helvetica, and height of a line of text with what is below its base line, both relative
 # to the height of capitals; rather too large than too small.
 CHARACTER_WIDTH, LINE_HEIGHT = 0.84, 1.5
+# Side of the cells in which shapes are looked up, mm: about the width of a name.
+CELL = 8.0
 
 
-@dataclass
+class Shapes:
+    """Shapes by the cells of a grid in which they are, so that those near a place are found quickly."""
+
+    def __init__(self) -> None:
+        self._by_cell: dict[tuple[int, int], list[Geometry]] = {}
+
+    def add(self, shape: Geometry) -> None:
+        """Add a shape."""
+        for cell in _cells(shape.bounds):
+            self._by_cell.setdefault(cell, []).append(shape)
+
+    def meet(self, shape: Geometry) -> bool:
+        """Return whether one of the shapes intersects another shape."""
+        return any(
+            shape.intersects(candidate)
+            for cell in _cells(shape.bounds)
+            for candidate in self._by_cell.get(cell, ())
+        )
+
+
+def _cells(bounds: tuple[float, float, float, float]) -> Iterator[tuple[int, int]]:
+    left, low, right, high = (int(bound // CELL) for bound in bounds)
+    return product(range(left, right + 1), range(low, high + 1))
+
+
 class Labels:
     """Texts and marks in a shape, such as a piece.
 
     Attributes:
-        shape: the shape inside which they must be.
-        boxes: what is already covered.
-        lines: lines that texts cross only where there is no other place.
         texts: the texts that have been placed.
     """
 
-    shape: Polygon
-    boxes: list[Polygon] = field(default_factory=list)
-    lines: list[LineString] = field(default_factory=list)
-    texts: list[Text] = field(default_factory=list)
-
-    def __post_init__(self) -> None:
-        shapely().prepare(self.shape)
+    def __init__(self, shape: Polygon) -> None:
+        """Take the shape inside which they must be."""
+        self.shape = shape
+        self.texts: list[Text] = []
+        self._covered, self._lines = Shapes(), Shapes()
+        shapely().prepare(shape)
 
     def is_free(self, box: Polygon, crosses_lines: bool = False) -> bool:
         """Return whether a shape is inside and covers nothing.
@@ -46,12 +68,19 @@ class Labels:
             box: the shape.
             crosses_lines: whether it may cross lines.
         """
-        obstacles = self.boxes if crosses_lines else [*self.boxes, *self.lines]
-        return self.shape.contains(box) and not any(map(box.intersects, obstacles))
+        return (
+            not self._covered.meet(box)
+            and (crosses_lines or not self._lines.meet(box))
+            and self.shape.contains(box)
+        )
 
-    def cover(self, shape: Polygon) -> None:
+    def cover(self, shape: Geometry) -> None:
         """Let no text be placed on a shape."""
-        self.boxes.append(shape)
+        self._covered.add(shape)
+
+    def avoid(self, line: LineString) -> None:
+        """Let texts cross a line only where there is no other place."""
+        self._lines.add(line)
 
     def add(self, candidates: Iterable[Text], crosses_lines: bool = False) -> Text | None:
         """Place the first of some texts that has room, and return it; None if none has.

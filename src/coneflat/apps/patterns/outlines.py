@@ -45,7 +45,7 @@ def drawing_of(pattern: Pattern) -> Drawing:
         for room in (rooms.inside[piece], rooms.allowances[piece]):
             room.cover(shapely().LineString(ends))
     for ends in pattern.folds:
-        rooms.inside[piece_of_point[ends[0]]].lines.append(shapely().LineString(points[ends]))
+        rooms.inside[piece_of_point[ends[0]]].avoid(shapely().LineString(points[ends]))
     for piece, room in enumerate(rooms.inside):
         lines += add_number(room, rooms.outside, piece, shapes[piece].inside.area)
         if pattern.is_sewn:

@@ -117,8 +117,12 @@ def add_seam_name(rooms: tuple[Labels, Labels, Labels], name: str, side: FloatAr
     sizes = [size for size in SEAM_SIZES if LINE_HEIGHT * size <= width]
 
     def texts(sizes: Sequence[float], shifts: Sequence[float], start: float = 0.0) -> Iterator[Text]:
-        for size, shift, share in product(sizes, shifts, ALONG):
-            yield _beside(name, side, along, share, size, start + shift * size)
+        for size in sizes:
+            half = min(text_width(name, size), float(along[-1])) / 2
+            # Along a side that is shorter than the text, there is only one place.
+            middles = dict.fromkeys(min(max(share * along[-1], half), along[-1] - half) for share in ALONG)
+            for shift, middle in product(shifts, middles):
+                yield _beside(name, side, along, middle, half, size, start + shift * size)
 
     _ = (
         inside.add(texts(SEAM_SIZES, INWARD))
@@ -128,13 +132,20 @@ def add_seam_name(rooms: tuple[Labels, Labels, Labels], name: str, side: FloatAr
     )
 
 
-def _beside(name: str, side: FloatArray, along: FloatArray, share: float, size: float, inward: float) -> Text:
+def _beside(
+    name: str, side: FloatArray, along: FloatArray, middle: float, half: float, size: float, inward: float
+) -> Text:
     """Return a text beside a side; the direction is that of the part of the side as long as the text.
 
-    inward: distance from the side, mm, negative for outside.
+    Args:
+        name: the text.
+        side: (k, 2) the points of the side.
+        along: (k,) their distances along it.
+        middle: the distance of the middle of the part.
+        half: half the length of the part.
+        size: height of capitals.
+        inward: distance from the side, negative for outside.
     """
-    half = min(text_width(name, size), float(along[-1])) / 2
-    middle = min(max(share * along[-1], half), along[-1] - half)
     start, place, stop = (
         np.array([np.interp(at, along, column) for column in side.T])
         for at in (middle - half, middle, middle + half)
