@@ -87,6 +87,10 @@ class Pattern:
         Raises:
             OptionError: options of the pattern cannot be met, or shapely is not installed.
         """
+        return self._drawn
+
+    @cached_property
+    def _drawn(self) -> Drawing:
         return _DRAWING(self)
 
     def save(self, path: str | PathLike[str]) -> Path:
