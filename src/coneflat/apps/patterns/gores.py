@@ -14,12 +14,8 @@ from ...mesh import tie_key
 from .cut_surface import CutSurface
 from .development import Development
 from .half_planes import AroundAxis
-from .strain import Stretch, least_strain, with_equal_sides
+from .relaxation import relaxed
 
-# The strain for which layouts are evened out first; then its largest value is minimised.
-FIRST_STRAIN, FIRST_EXPONENTS = 0.05, (2, 4)
-# Strain below which strips count as developable: it is not minimised further.
-MIN_STRAIN = 1e-7
 # Digits of radii and keys by which the vertex of the first half-plane is chosen: rounding errors are smaller.
 DIGITS = 7
 
@@ -48,7 +44,7 @@ def cut_gores(mesh: TriangleMesh, count: int, axis: FloatArray) -> Development:
     closed = CutSurface(strips.mesh, strips.mesh.faces, np.zeros((len(strips.mesh.vertices), 2)))
     flat = closed.cut_along(np.flatnonzero(is_seam))
     _check_strips(flat, strips)
-    flat = _relaxed(_laid_out(flat))
+    flat = relaxed(_laid_out(flat))
     return Development(replace(flat, points=_upright(flat, strips)))
 
 
@@ -144,16 +140,6 @@ def _opened_vertices(flat: CutSurface) -> FloatArray:
     vertices = np.empty((len(flat.points), 3))
     vertices[flat.corners] = flat.mesh.vertices[flat.mesh.faces]
     return vertices
-
-
-def _relaxed(flat: CutSurface) -> CutSurface:
-    """Return the strips with the least strain, and seams with sides of equal length."""
-    stretch = Stretch(FIRST_STRAIN, FIRST_STRAIN)
-    points = least_strain(flat.edges, flat.corners, flat.points, stretch, FIRST_EXPONENTS)
-    strain = float(np.abs(flat.edges.strains(points)).max())
-    if strain > MIN_STRAIN:
-        points = least_strain(flat.edges, flat.corners, points, Stretch(strain, strain))
-    return replace(flat, points=with_equal_sides(flat.edges, flat.corners, points))
 
 
 def _upright(flat: CutSurface, strips: _Strips) -> FloatArray:
