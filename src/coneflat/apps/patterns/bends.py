@@ -96,9 +96,9 @@ def _creases(surface: CutSurface) -> list[_Crease]:
     edges, pairs = edges[pairs[:, 0] != pairs[:, 1]], pairs[pairs[:, 0] != pairs[:, 1]]
     order = np.lexsort([edges, pairs[:, 1], pairs[:, 0]])
     edges, pairs = edges[order], pairs[order]
-    starts = (
-        np.flatnonzero(np.r_[True, (pairs[1:] != pairs[:-1]).any(axis=1)]) if len(edges) else np.empty(0, int)
-    )
+    if not len(edges):
+        return []
+    starts = np.flatnonzero(np.r_[True, (pairs[1:] != pairs[:-1]).any(axis=1)])
     is_border = surface.is_border_vertex
     creases = []
     for group, pair in zip(np.split(edges, starts[1:]), pairs[starts].tolist(), strict=True):
@@ -186,7 +186,7 @@ def _path_through(start: int, neighbours: dict[int, set[int]]) -> list[int]:
 
 
 def _with_ends(chain: list[int], creases: list[_Crease], strips: dict[int, list[int]]) -> list[int]:
-    """Return a chain with the creases at its ends, where a cylinder meets flat parts: they turn no more than its own."""
+    """Return a chain with the creases at its ends, where a cylinder meets flat parts, if they turn no more."""
     angle = creases[chain[0]].angle
     for place in (0, -1):
         for part in creases[chain[place]].parts:

@@ -27,8 +27,8 @@ def thickness_of(mesh: TriangleMesh) -> float | None:
         mesh: a connected mesh.
 
     Notes:
-        Rays start at points that are distributed over the surface, against its normals. A sheet is a solid in which most
-        of them meet a parallel side at the same distance, which is small against the root of the area of one side.
+        Rays start at points that are distributed over the surface, against its normals. A sheet is a solid in which
+        most of them meet a parallel side at the same distance, which is small against the root of the area of one side.
     """
     if mesh.is_boundary_edge.any():
         return None
@@ -42,7 +42,7 @@ def thickness_of(mesh: TriangleMesh) -> float | None:
         return None
     thickness = float(np.median(distances[is_parallel]))
     agrees = is_parallel & (np.abs(distances - thickness) <= TOLERANCE * thickness)
-    is_sheet = agrees.mean() >= MIN_SHARE and thickness <= MAX_THICKNESS * np.sqrt(sums[-1] / 2)
+    is_sheet = agrees.mean() >= MIN_SHARE and thickness <= MAX_THICKNESS * np.sqrt(areas.sum() / 2)
     return float(np.median(distances[agrees])) if is_sheet else None
 
 
