@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...base import FloatArray, IntArray, mask_of
+from ...base import BoolArray, FloatArray, IntArray, mask_of
 from ...geometry import dihedral_angles
 from ...mesh import label_components
 from .cut_surface import CutSurface
-from .development import MIN_FOLD_ANGLE, Bend
+from .development import MIN_FOLD_ANGLE
 
 # Largest angle between the facets of a cylinder, radians.
 MAX_FACET_ANGLE = 0.6
@@ -19,8 +19,27 @@ MAX_FACET_ANGLE = 0.6
 WIDTHS, ANGLES = 0.05, 0.1
 # Largest sine of the angle between rulings that count as parallel.
 PARALLEL = 1e-3
-# Distance of the end of a fold from the border of its piece, relative to its length, up to which it reaches the border.
-AT_BORDER = 1e-6
+# Largest strain of a surface that is bent, and not stretched.
+DEVELOPABLE = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class Bend:
+    """A bend of a sheet about a line: sharp, or a part of a cylinder.
+
+    Attributes:
+        piece: the piece.
+        line: (2, 2) the ends of its centre line in the plane.
+        angle: by how much the normal turns, radians: positive for a mountain seen from outside, else negative.
+        radius: of the cylinder through the surface, 0 for a sharp bend.
+        width: of the bent part in the plane across the line, 0 for a sharp bend.
+    """
+
+    piece: int
+    line: FloatArray
+    angle: float
+    radius: float = 0.0
+    width: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,11 +47,13 @@ class _Crease:
     """A straight fold between two flat parts.
 
     Attributes:
+        piece: the piece.
         parts: the two flat parts.
         line: (2, 2) its ends in the plane.
         angle: the dihedral angle, positive for a mountain.
     """
 
+    piece: int
     parts: tuple[int, int]
     line: FloatArray
     angle: float
@@ -60,15 +81,17 @@ class _Crease:
 
 
 def find_bends(surface: CutSurface) -> tuple[Bend, ...]:
-    """Return the bends of a developable surface.
+    """Return the bends of a developable surface; none if it is stretched.
 
     A sharp bend is a straight fold between two flat parts, from border to border. Facets of equal width between
     parallel folds with equal angles form a bend about a cylinder through their folds; the folds beside it, where it
     ends at flat parts, belong to it. Folds of cones are no bends.
 
     Args:
-        surface: the surface, developed without strain.
+        surface: the surface in the plane.
     """
+    if np.abs(surface.edges.strains(surface.points)).max() > DEVELOPABLE:
+        return ()
     creases = _creases(surface)
     at_part: dict[int, list[int]] = {}
     for number, crease in enumerate(creases):
@@ -80,7 +103,11 @@ def find_bends(surface: CutSurface) -> tuple[Bend, ...]:
         done.update(chain)
         if all(creases[chain[0]].is_parallel_to(creases[number]) for number in chain):
             bends.append(_cylinder([creases[number] for number in chain]))
-    bends += [Bend(crease.line, crease.angle) for number, crease in enumerate(creases) if number not in done]
+    bends += [
+        Bend(crease.piece, crease.line, crease.angle)
+        for number, crease in enumerate(creases)
+        if number not in done
+    ]
     return tuple(bends)
 
 
@@ -109,7 +136,7 @@ def _creases(surface: CutSurface) -> list[_Crease]:
 
 
 def _crease(
-    surface: CutSurface, edges: IntArray, parts: tuple[int, int], angles: FloatArray, is_border: FloatArray
+    surface: CutSurface, edges: IntArray, parts: tuple[int, int], angles: FloatArray, is_border: BoolArray
 ) -> _Crease | None:
     """Return the crease that consists of given edges; None if it is not straight or does not reach the border."""
     mesh = surface.mesh
@@ -127,7 +154,7 @@ def _crease(
     length = stations[last] - stations[first]
     if np.abs(across).max() > PARALLEL * length or not is_border[vertices[[first, last]]].all():
         return None
-    return _Crease(parts, line, float(np.median(angles)))
+    return _Crease(int(surface.pieces[triangle[0]]), parts, line, float(np.median(angles)))
 
 
 def _chains(creases: list[_Crease], strips: dict[int, list[int]]) -> Iterator[list[int]]:
@@ -211,4 +238,4 @@ def _cylinder(creases: list[_Crease]) -> Bend:
     line = np.outer([stations.min(), stations.max()], along) + centre * across
     radius = width / (2 * np.sin(abs(inner.angle) / 2))
     angle = sum(crease.angle for crease in creases)
-    return Bend(line, angle, float(radius), first.distance_to(last))
+    return Bend(first.piece, line, angle, float(radius), first.distance_to(last))

@@ -15,16 +15,8 @@ from ...mesh import label_components
 from .cut_surface import CutSurface
 from .development import Development, find_folds
 from .net_kernels import Faces, Placement
-from .net_search import (
-    Workspace,
-    cut_collisions,
-    join_at,
-    join_longest,
-    place_and_collide,
-    place_pieces,
-    untangle,
-    workspace_of,
-)
+from .net_moves import Workspace, place_and_collide, place_pieces, workspace_of
+from .net_search import cut_collisions, join_at, join_longest, untangle
 from .polyhedron import DIGITS, Polyhedron
 
 # Comparisons of boxes, about two nanoseconds each: for untangling one tree of all faces, for each attempt to join two
@@ -205,7 +197,7 @@ class _Search:
         before = self.net.is_joined.copy()
         pieces = self.net.piece[self.faces.hinge_faces]
         hinges = np.flatnonzero((pieces[:, 0] != pieces[:, 1]) & (pieces == piece).any(axis=1))
-        spent, counts = 0, []
+        spent, counts = 0, list[int]()
         for hinge in hinges.tolist():
             number, comparisons = join_at(self.faces, self.net, hinge, JOINED_COLLISIONS, self.work)
             spent += comparisons

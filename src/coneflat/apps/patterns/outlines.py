@@ -50,6 +50,8 @@ def drawing_of(pattern: Pattern) -> Drawing:
     piece_of_point = _piece_of_points(pattern)
     for ends, angle in zip(pattern.folds, pattern.fold_angles, strict=True):
         add_angle(rooms.inside[piece_of_point[ends[0]]], pattern.surface.points[ends], float(angle))
+    for bend in pattern.bends:
+        add_angle(rooms.inside[bend.piece], bend.line, bend.angle, bend.radius)
     return Drawing(float(width), float(height), tuple(lines), tuple(rooms.texts()))
 
 
@@ -110,6 +112,8 @@ def _tab_folds(pattern: Pattern) -> Iterator[Line]:
 def _folds(pattern: Pattern) -> Iterator[Line]:
     for ends, angle in zip(pattern.folds, pattern.fold_angles, strict=True):
         yield Line("fold", pattern.surface.points[ends], dashes=MOUNTAIN if angle > 0 else VALLEY)
+    for bend in pattern.bends:
+        yield Line("fold", bend.line, dashes=MOUNTAIN if bend.angle > 0 else VALLEY)
 
 
 def _notch_lines(pattern: Pattern, finish: Finish) -> Iterator[Line]:

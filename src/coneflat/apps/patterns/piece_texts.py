@@ -148,9 +148,9 @@ def _beside(name: str, side: FloatArray, along: FloatArray, share: float, size: 
     return Text(name, place + (bulge + abs(inward)) * normal, size, upright(direction))
 
 
-def add_angle(room: Labels, ends: FloatArray, angle: float) -> None:
-    """Place the dihedral angle of a fold, in degrees, along its line (2, 2), if there is room."""
-    text = f"{abs(np.degrees(angle)):.0f}\u00b0"
+def add_angle(room: Labels, ends: FloatArray, angle: float, radius: float = 0.0) -> None:
+    """Place the dihedral angle of a fold, in degrees, along its line (2, 2), if there is room; and its radius, mm."""
+    text = f"{abs(np.degrees(angle)):.0f}\u00b0" + (f" R{radius:.4g}" if radius else "")
     vector = ends[1] - ends[0]
     length = float(np.linalg.norm(vector))
     direction = vector / length

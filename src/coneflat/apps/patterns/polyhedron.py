@@ -136,7 +136,8 @@ def _hinges(mesh: TriangleMesh, face: IntArray, vertex_key: FloatArray) -> tuple
     )
     is_first = _are_first(pairs[order])
     group = np.cumsum(is_first) - 1
-    return edges[order[is_first]], np.bincount(group, lengths[order]) if len(group) else np.empty(0)
+    totals: FloatArray = np.bincount(group, lengths[order], int(is_first.sum()))
+    return edges[order[is_first]].astype(np.int64), totals
 
 
 def _are_first(rows: IntArray) -> BoolArray:

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from ...base import EntryPoint, FloatArray, IntArray
+from .bends import Bend, find_bends
 from .borders import Borders, Seam, find_borders
 from .cut_surface import CutSurface
 from .drawing import Drawing
@@ -66,6 +67,11 @@ class Pattern:
     def darts(self) -> tuple[Seam, ...]:
         """The seams that end in a tip inside a piece."""
         return tuple(seam for seam in self.seams if seam.is_dart)
+
+    @cached_property
+    def bends(self) -> tuple[Bend, ...]:
+        """The bends of a sheet; none of other kinds, and of sheets that are stretched."""
+        return find_bends(self.surface) if self.kind == "sheet" else ()
 
     @cached_property
     def strains(self) -> FloatArray:

@@ -9,9 +9,8 @@ from ...base import IntArray, inner_calls
 from ...errors import MeshError
 from ...geometry import angle_defect, corner_angles, edge_lengths
 from ...seams import find_seams
-from .bends import find_bends
 from .cut_surface import CutSurface
-from .development import Development, find_folds
+from .development import Development
 from .relaxation import relaxed
 from .separation import without_overlaps
 from .thickness import thickness_of
@@ -21,15 +20,13 @@ from .thickness import thickness_of
 MIN_CORNER = 0.05
 # Largest sum of the other angle defects, radians, and largest number of corners, of a surface that is cut there.
 MAX_REST, MAX_CORNERS = 1e-4, 48
-# Largest strain of a blank of which bend lines are drawn.
-DEVELOPABLE = 1e-6
 
 
 def develop_sheet(mesh: TriangleMesh) -> Development:
-    """Return one piece for each component of a surface, with as few cuts as possible, little strain, and bend lines.
+    """Return one piece for each component of a surface, with as few cuts as possible and little strain.
 
     Developable surfaces are exact. If the curvature of a surface is in a few corners, such as those of a box without
-    lid, it is cut from there to its border, and exact. Other curvature remains as strain.
+    lid, it is cut from there to its border, and exact. Other curvature remains as strain. Bends: `find_bends`.
 
     Args:
         mesh: a mesh of one side of the sheet; closed surfaces are cut.
@@ -48,11 +45,7 @@ def develop_sheet(mesh: TriangleMesh) -> Development:
         seams.append(vertices[component.edges[_corner_cuts(component)]])
     with inner_calls():
         result = unwrap(mesh.vertices, mesh.faces, seams=("none", np.concatenate(seams)), charts="one")
-    flat = without_overlaps(relaxed(CutSurface.of(result)))
-    folds, angles = find_folds(flat)
-    strain = np.abs(flat.edges.strains(flat.points)).max()
-    bends = find_bends(flat) if strain <= DEVELOPABLE else ()
-    return Development(flat, folds, angles, bends)
+    return Development(without_overlaps(relaxed(CutSurface.of(result))))
 
 
 def _corner_cuts(mesh: TriangleMesh) -> IntArray:
