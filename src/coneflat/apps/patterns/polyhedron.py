@@ -61,6 +61,13 @@ class Polyhedron:
         """(h, 2) the faces at each hinge."""
         return self.face[self.mesh.edge_faces[self.hinges]]
 
+    @property
+    def has_divided_edges(self) -> bool:
+        """Whether two adjacent faces have several edges in common."""
+        ends = self.mesh.vertices[self.mesh.edges[self.hinges]]
+        lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+        return bool((self.hinge_lengths > 1.0001 * lengths).any())
+
     @cached_property
     def hinge_ends(self) -> FloatArray:
         """(h, 2, 2, 2) the ends of each hinge in the frames of its two faces, in the same order."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ... import TriangleMesh, unwrap
-from ...base import IntArray, inner_calls
+from ...base import FloatArray, IntArray, inner_calls
 from ...errors import MeshError
 from ...geometry import angle_defect, corner_angles, edge_lengths
 from ...seams import find_seams
@@ -42,22 +42,37 @@ def develop_sheet(mesh: TriangleMesh) -> Development:
                 f"the mesh is a solid that is {thickness:.3g} mm thick, but a sheet is given by one of its sides: "
                 f"delete the other side and the edges between them"
             )
-        seams.append(vertices[component.edges[_corner_cuts(component)]])
+        seams.append(vertices[component.edges[_cuts(component)]])
     with inner_calls():
         result = unwrap(mesh.vertices, mesh.faces, seams=("none", np.concatenate(seams)), charts="one")
     return Development(without_overlaps(relaxed(CutSurface.of(result))))
 
 
-def _corner_cuts(mesh: TriangleMesh) -> IntArray:
-    """Return the edges of a connected mesh to cut so that it is developable; none if it is curved beside corners."""
+def _cuts(mesh: TriangleMesh) -> IntArray:
+    """Return the edges of a connected mesh to cut so that it is developable; none if it is curved beside corners.
+
+    Cuts reach all corners, and holes around which directions turn, such as the upper rim of a truncated cone.
+    """
     angles = corner_angles(edge_lengths(mesh.vertices, mesh.faces))
-    defect = np.abs(angle_defect(mesh.faces, angles, mesh.is_boundary_vertex))
-    defect[mesh.is_boundary_vertex] = 0
-    corners = np.flatnonzero(defect > MIN_CORNER)
-    rest = defect.sum() - defect[corners].sum()
-    if not 0 < len(corners) <= MAX_CORNERS or rest > MAX_REST:
+    defect = angle_defect(mesh.faces, angles, mesh.is_boundary_vertex)
+    inner = np.where(mesh.is_boundary_vertex, 0.0, np.abs(defect))
+    corners = np.flatnonzero(inner > MIN_CORNER)
+    holes = _holes(mesh)
+    flat_holes = [walk for walk in holes if abs(defect[mesh.tails[walk]].sum() + 2 * np.pi) <= MAX_REST]
+    is_curved = inner.sum() - inner[corners].sum() > MAX_REST or len(corners) > MAX_CORNERS
+    if is_curved or (not len(corners) and len(flat_holes) == len(holes)):
         return np.empty(0, dtype=np.int64)
+    return find_seams(mesh, corners, _edge_lengths(mesh), kept_holes=flat_holes)
+
+
+def _holes(mesh: TriangleMesh) -> list[IntArray]:
+    """Return the half-edges of each boundary loop but the longest."""
+    lengths = _edge_lengths(mesh)
+    return sorted(mesh.boundary_walks(), key=lambda walk: float(lengths[mesh.halfedge_edges[walk]].sum()))[
+        :-1
+    ]
+
+
+def _edge_lengths(mesh: TriangleMesh) -> FloatArray:
     ends = mesh.vertices[mesh.edges]
-    lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
-    holes = sorted(mesh.boundary_walks(), key=lambda walk: lengths[mesh.halfedge_edges[walk]].sum())[:-1]
-    return find_seams(mesh, corners, lengths, kept_holes=holes)
+    return np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
