@@ -211,7 +211,7 @@ class _Search:
                 self.net.is_joined[:] = before
                 place_pieces(self.faces, self.net, self.work.walk)
         result = np.empty_like(before)
-        for i in np.lexsort([-self.lengths[hinges], counts])[:TRIED_JOINTS].tolist():
+        for i in np.lexsort([-self.lengths[hinges], np.array(counts)])[:TRIED_JOINTS].tolist():
             if counts[i] == JOINED_COLLISIONS:
                 break
             number, _ = join_at(self.faces, self.net, int(hinges[i]), JOINED_COLLISIONS, self.work)

@@ -143,7 +143,7 @@ def _hinges(mesh: TriangleMesh, face: IntArray, vertex_key: FloatArray) -> tuple
     )
     is_first = _are_first(pairs[order])
     group = np.cumsum(is_first) - 1
-    totals: FloatArray = np.bincount(group, lengths[order], int(is_first.sum()))
+    totals = np.bincount(group, lengths[order], int(is_first.sum())).astype(float)
     return edges[order[is_first]].astype(np.int64), totals
 
 

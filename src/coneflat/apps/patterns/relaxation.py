@@ -8,7 +8,7 @@ import numpy as np
 
 from ...errors import MetricError
 from .cut_surface import CutSurface
-from .strain import Stretch, least_strain, with_equal_sides
+from .strain import EXPONENTS, Stretch, least_strain, with_equal_sides
 
 # The strain for which layouts are evened out first; then its largest value is minimised.
 FIRST_STRAIN, FIRST_EXPONENTS = 0.05, (2, 4)
@@ -41,7 +41,7 @@ def _largest_strain(surface: CutSurface) -> float:
     return float(np.abs(surface.edges.strains(surface.points)).max())
 
 
-def _relaxed_for(surface: CutSurface, strain: float, *exponents: tuple[int, ...]) -> CutSurface:
+def _relaxed_for(surface: CutSurface, strain: float, exponents: tuple[int, ...] = EXPONENTS) -> CutSurface:
     stretch = Stretch(strain, strain)
-    points = least_strain(surface.edges, surface.corners, surface.points, stretch, *exponents)
+    points = least_strain(surface.edges, surface.corners, surface.points, stretch, exponents=exponents)
     return replace(surface, points=points)
