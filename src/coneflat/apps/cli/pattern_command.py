@@ -103,7 +103,11 @@ def _rows(result: Pattern, report: dict[str, Any]) -> list[tuple[str, str, str]]
     eased = f"sides of {report['eased_seams']} differ, by {report['ease_max']:.1f} mm at most"
     rows = [
         ("pieces", f"{report['pieces']}", f"{report['area'] / 100:.0f} cm\u00b2 in total"),
-        ("seams", f"{report['seams'] - report['darts']}", eased if report["eased_seams"] else "sides equally long"),
+        (
+            "seams",
+            f"{report['seams'] - report['darts']}",
+            eased if report["eased_seams"] else "sides equally long",
+        ),
         ("darts", f"{report['darts']}", "ends of seams inside a piece"),
         ("seam length", f"{report['seam_length']:.0f} mm", "on the model, darts included"),
         ("strain", f"{100 * report['strain_max']:.2g} %", "largest relative change of the length of an edge"),

@@ -76,7 +76,9 @@ def cut_cloth(mesh: TriangleMesh, stretch: Stretch, seams: Any = None) -> CutSur
         seams: edges that must be cut, as for `coneflat.unwrap`.
     """
     first = ENERGY_PER_STRAIN * (stretch.warp**2 + stretch.weft**2) / 2
-    shortest, smallest, factor = None, None, 1.0
+    factor = 1.0
+    shortest: CutSurface | None = None
+    smallest: CutSurface | None = None
     for _ in range(TEXTURES):
         texture = unwrap(
             mesh.vertices, mesh.faces, max_energy=ISOMETRIC + factor * first, packing_cuts=0.0, seams=seams
@@ -96,7 +98,9 @@ def cut_cloth(mesh: TriangleMesh, stretch: Stretch, seams: Any = None) -> CutSur
             if smallest is None or beyond < excess(smallest, stretch).max():
                 smallest = surface
             factor /= 2
-    return shortest or smallest
+    best = shortest or smallest
+    assert best is not None
+    return best
 
 
 def without_darts(surface: CutSurface, stretch: Stretch) -> CutSurface:
@@ -139,8 +143,8 @@ def slit_until_within(surface: CutSurface, stretch: Stretch) -> CutSurface:
         if not len(tips):
             break
         slits = _slits(even, tips)
-        cut = [layout.cut_along(np.union1d(layout.seams, slits)) for layout in (even, flat)]
-        even, flat = _relaxed_near(*cut, slits, stretch)
+        seams = np.union1d(even.seams, slits)
+        even, flat = _relaxed_near(even.cut_along(seams), flat.cut_along(seams), slits, stretch)
     return closed
 
 

@@ -16,23 +16,6 @@ MIN_FOLD_ANGLE = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
-class Bend:
-    """A bend of a sheet about a line: flat parts beside it, or a part of a cylinder.
-
-    Attributes:
-        line: (2, 2) the ends of its centre line in the plane.
-        angle: by how much the normal turns, radians: positive for a mountain seen from outside, else negative.
-        radius: of the cylinder through the surface, 0 for a sharp bend.
-        width: of the bent part in the plane across the line, 0 for a sharp bend.
-    """
-
-    line: FloatArray
-    angle: float
-    radius: float = 0.0
-    width: float = 0.0
-
-
-@dataclass(frozen=True, eq=False)
 class Development:
     """A surface developed into the plane.
 
@@ -40,14 +23,12 @@ class Development:
         surface: the pieces, each anywhere.
         folds: (f, 2) points of fold lines.
         fold_angles: (f,) their dihedral angles in radians, positive for mountain folds seen from outside.
-        bends: bends of a sheet.
         notes: what could not be met, one sentence each.
     """
 
     surface: CutSurface
     folds: IntArray = field(default_factory=lambda: np.empty((0, 2), dtype=np.int64))
     fold_angles: FloatArray = field(default_factory=lambda: np.empty(0))
-    bends: tuple[Bend, ...] = ()
     notes: tuple[str, ...] = ()
 
 

@@ -137,6 +137,8 @@ def _how_to_read(pattern: Pattern) -> Iterator[str]:
             "Blue lines are folded: away from you where dash-dotted (mountains), towards you where dashed (valleys), "
             "by the angle that is written there."
         )
+    if any(bend.radius for bend in pattern.bends):
+        yield "R is the radius of a bend of the surface, mm; its line is the middle of what is bent."
     eased = [seam for seam in pattern.seams if seam.is_eased]
     if eased:
         yield f"{plural(len(eased), 'seam')} with sides of different lengths: ease in the longer side evenly."

@@ -17,11 +17,13 @@ from ...options import read_options, settings, takes
 from ..view import upward_axis
 from .cloth import cloth_pieces
 from .development import Development
+from .gores import cut_gores
 from .nesting import grain_up, nested
 from .net import unfold_net
 from .options import PatternOptions
 from .result import Pattern
 from .shapes import Tab
+from .sheet import develop_sheet
 from .tabs import glue_tabs
 from .units import MILLIMETRES, text_of_size
 
@@ -135,12 +137,26 @@ def _net(model: Model, options: PatternOptions) -> Development:
     return unfold_net(model.mesh)
 
 
-_METHODS: Mapping[str, Callable[[Model, PatternOptions], Development]] = {"cloth": _cloth, "net": _net}
+def _gores(model: Model, options: PatternOptions) -> Development:
+    return cut_gores(model.mesh, options.gores, model.axis)
+
+
+def _sheet(model: Model, options: PatternOptions) -> Development:
+    return develop_sheet(model.mesh)
+
+
+_METHODS: Mapping[str, Callable[[Model, PatternOptions], Development]] = {
+    "cloth": _cloth,
+    "net": _net,
+    "gores": _gores,
+    "sheet": _sheet,
+}
 
 
 def _placed(model: Model, developed: Development, options: PatternOptions) -> Pattern:
     """Return the pattern of developed pieces, with glue tabs, placed side by side."""
-    surface = grain_up(developed.surface, model.axis)
+    # Gores are upright already.
+    surface = developed.surface if options.kind == "gores" else grain_up(developed.surface, model.axis)
     result = Pattern(
         kind=options.kind,
         surface=surface,

@@ -18,7 +18,7 @@ from .finish import Finish
 from .labels import rotated
 from .papers import EDGE, OVERLAP, Paper
 from .result import Pattern
-from .shapes import PieceShape, piece_at, piece_shapes
+from .shapes import PieceShape, piece_shapes
 from .tiling import tiles_of
 
 if TYPE_CHECKING:
@@ -72,7 +72,7 @@ def nested(pattern: Pattern) -> Pattern:
         pattern.surface, pattern.borders, Finish.of(pattern.kind, pattern.settings), pattern.tabs
     )
     pieces = _Pieces(_outlines(shapes), _angles(shapes, pattern.is_sewn))
-    return _moved(pattern, shapes, _packed(pieces, shapes, paper))
+    return _moved(pattern, _packed(pieces, shapes, paper))
 
 
 @dataclass(frozen=True, eq=False)
@@ -197,7 +197,7 @@ def _placed_points(points: FloatArray, packing: SheetPacking, piece: int) -> Flo
     return rotated(points, packing.angle[piece]) + np.array([shift.real, shift.imag])
 
 
-def _moved(pattern: Pattern, shapes: Sequence[PieceShape], packing: SheetPacking) -> Pattern:
+def _moved(pattern: Pattern, packing: SheetPacking) -> Pattern:
     """Return a pattern with its pieces placed by a packing."""
     surface = pattern.surface
     points = surface.points.copy()
@@ -207,8 +207,4 @@ def _moved(pattern: Pattern, shapes: Sequence[PieceShape], packing: SheetPacking
     tabs = tuple(
         replace(tab, polygon=_placed_points(tab.polygon, packing, tab.piece)) for tab in pattern.tabs
     )
-    bends = tuple(
-        replace(bend, line=_placed_points(bend.line, packing, piece_at(shapes, bend.line.mean(axis=0))))
-        for bend in pattern.bends
-    )
-    return replace(pattern, surface=replace(surface, points=points), tabs=tabs, bends=bends)
+    return replace(pattern, surface=replace(surface, points=points), tabs=tabs)

@@ -15,21 +15,15 @@ from ...mesh import label_components
 from .cut_surface import CutSurface
 from .development import Development, find_folds
 from .net_kernels import Faces, Placement
-from .net_search import (
-    Workspace,
-    cut_collisions,
-    join_at,
-    join_longest,
-    place_and_collide,
-    place_pieces,
-    untangle,
-    workspace_of,
-)
+from .net_moves import Workspace, place_and_collide, place_pieces, workspace_of
+from .net_search import cut_collisions, join_at, join_longest, untangle
 from .polyhedron import DIGITS, Polyhedron
 
-# Comparisons of boxes, about two nanoseconds each: for untangling one tree of all faces, for each attempt to join two
-# pieces, for all of these attempts, and for exchanging joined hinges for longer ones.
-TREE_BUDGET, JOIN_BUDGET, ALL_JOINS_BUDGET, EXCHANGE_BUDGET = 1 * 10**9, 5 * 10**7, 2 * 10**9, 10**9
+# Comparisons of boxes per triangle, about ten nanoseconds each: for untangling one tree of all faces, for each attempt
+# to join two pieces, for all of these attempts, and for exchanging joined hinges for longer ones.
+TREE_BUDGET, JOIN_BUDGET, ALL_JOINS_BUDGET, EXCHANGE_BUDGET = 600_000, 30_000, 600_000, 600_000
+# Triangles above which budgets do not grow.
+MAX_BUDGET_TRIANGLES = 2000
 # Depths up to which triangles touch and do not overlap, relative to the root of the area of the surface. The second is
 # a third of a micrometre where that is 300 mm: coordinates of single precision may need it along divided edges.
 TOUCHING, NOISY_TOUCHING = 1e-11, 1e-6
@@ -65,7 +59,7 @@ def unfold_net(mesh: TriangleMesh) -> Development:
     weights = list(_weights(polyhedron))
     search = _Search(faces, lengths)
     net = search.fewest_pieces(weights)
-    if net.piece.max() + 1 > search.component_count:
+    if net.piece.max() + 1 > search.component_count and polyhedron.has_divided_edges:
         noisy = _Search(faces._replace(touching=NOISY_TOUCHING), lengths).fewest_pieces(weights)
         net = min(net, noisy, key=lambda placement: int(placement.piece.max()))
     places = np.empty((len(order), 3, 2))
@@ -118,6 +112,7 @@ class _Search:
     def __init__(self, faces: Faces, lengths: FloatArray) -> None:
         f, m, h = len(faces.starts) - 1, len(faces.triangles), len(lengths)
         self.faces, self.lengths = faces, lengths
+        self.scale = min(m, MAX_BUDGET_TRIANGLES)
         self.work: Workspace = workspace_of(faces)
         self.net = Placement(
             np.zeros(h, dtype=bool),
@@ -136,7 +131,7 @@ class _Search:
         number = self._placed(trees[best])
         if number:
             tree = np.empty_like(trees[best])
-            untangle(self.faces, self.net, self.lengths, number, TREE_BUDGET, self.work, tree)
+            untangle(self.faces, self.net, self.lengths, number, self.scale * TREE_BUDGET, self.work, tree)
             number = self._placed(tree)
             cut_collisions(self.faces, self.net, self.lengths, number, self.work)
             place_pieces(self.faces, self.net, self.work.walk)
@@ -166,7 +161,7 @@ class _Search:
         spent = 0
         for _ in range(rounds):
             changes, comparisons = join_longest(
-                self.faces, self.net, self.lengths, order, EXCHANGE_BUDGET - spent, self.work
+                self.faces, self.net, self.lengths, order, self.scale * EXCHANGE_BUDGET - spent, self.work
             )
             spent += comparisons
             if not changes:
@@ -175,7 +170,7 @@ class _Search:
     def _join_pieces(self) -> None:
         """Join pieces, the smallest first, and untangle them, until none can be joined any more or time is up."""
         spent, failed = 0, set[int]()
-        while spent < ALL_JOINS_BUDGET:
+        while spent < self.scale * ALL_JOINS_BUDGET:
             piece = self._smallest_piece(failed)
             if piece is None:
                 return
@@ -205,7 +200,7 @@ class _Search:
         before = self.net.is_joined.copy()
         pieces = self.net.piece[self.faces.hinge_faces]
         hinges = np.flatnonzero((pieces[:, 0] != pieces[:, 1]) & (pieces == piece).any(axis=1))
-        spent, counts = 0, []
+        spent, counts = 0, list[int]()
         for hinge in hinges.tolist():
             number, comparisons = join_at(self.faces, self.net, hinge, JOINED_COLLISIONS, self.work)
             spent += comparisons
@@ -216,12 +211,12 @@ class _Search:
                 self.net.is_joined[:] = before
                 place_pieces(self.faces, self.net, self.work.walk)
         result = np.empty_like(before)
-        for i in np.lexsort([-self.lengths[hinges], counts])[:TRIED_JOINTS].tolist():
+        for i in np.lexsort([-self.lengths[hinges], np.array(counts)])[:TRIED_JOINTS].tolist():
             if counts[i] == JOINED_COLLISIONS:
                 break
             number, _ = join_at(self.faces, self.net, int(hinges[i]), JOINED_COLLISIONS, self.work)
             number, comparisons = untangle(
-                self.faces, self.net, self.lengths, number, JOIN_BUDGET, self.work, result
+                self.faces, self.net, self.lengths, number, self.scale * JOIN_BUDGET, self.work, result
             )
             spent += comparisons
             if number == 0:

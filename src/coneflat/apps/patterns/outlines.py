@@ -17,7 +17,7 @@ from .papers import EDGE
 from .piece_texts import add_angle, add_grain, add_number, add_seam_name
 from .result import Pattern
 from .seam_names import names_of
-from .shapes import PieceShape, piece_at, piece_shapes
+from .shapes import PieceShape, piece_shapes
 
 # Dashes and gaps, mm: seam lines, folds away from the eye (mountains) and towards it (valleys).
 SEAM_DASHES, MOUNTAIN, VALLEY = (4.0, 2.0), (7.0, 1.5, 1.0, 1.5), (4.0, 2.5)
@@ -56,8 +56,7 @@ def drawing_of(pattern: Pattern) -> Drawing:
     for ends, angle in zip(pattern.folds, pattern.fold_angles, strict=True):
         add_angle(rooms.inside[piece_of_point[ends[0]]], points[ends], float(angle))
     for bend in pattern.bends:
-        room = rooms.inside[piece_at(shapes, bend.line.mean(axis=0))]
-        add_angle(room, bend.line, bend.angle, bend.radius)
+        add_angle(rooms.inside[bend.piece], bend.line, bend.angle, bend.radius)
     return Drawing(float(width), float(height), tuple(lines), tuple(rooms.texts()))
 
 

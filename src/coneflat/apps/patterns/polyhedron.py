@@ -61,6 +61,13 @@ class Polyhedron:
         """(h, 2) the faces at each hinge."""
         return self.face[self.mesh.edge_faces[self.hinges]]
 
+    @property
+    def has_divided_edges(self) -> bool:
+        """Whether two adjacent faces have several edges in common."""
+        ends = self.mesh.vertices[self.mesh.edges[self.hinges]]
+        lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+        return bool((self.hinge_lengths > 1.0001 * lengths).any())
+
     @cached_property
     def hinge_ends(self) -> FloatArray:
         """(h, 2, 2, 2) the ends of each hinge in the frames of its two faces, in the same order."""
@@ -136,7 +143,8 @@ def _hinges(mesh: TriangleMesh, face: IntArray, vertex_key: FloatArray) -> tuple
     )
     is_first = _are_first(pairs[order])
     group = np.cumsum(is_first) - 1
-    return edges[order[is_first]], np.bincount(group, lengths[order]) if len(group) else np.empty(0)
+    totals = np.bincount(group, lengths[order], int(is_first.sum())).astype(float)
+    return edges[order[is_first]].astype(np.int64), totals
 
 
 def _are_first(rows: IntArray) -> BoolArray:

@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 
 from ...base import EntryPoint, FloatArray, IntArray
+from .bends import Bend, find_bends
 from .borders import Borders, Seam, find_borders
 from .cut_surface import CutSurface
-from .development import Bend
 from .drawing import Drawing
 from .finish import SEWN
 from .shapes import Tab
@@ -35,7 +35,6 @@ class Pattern:
         millimetres: millimetres per unit of the model.
         folds: (f, 2) points of fold lines inside pieces, and `fold_angles` (f,) their dihedral angles in radians,
             positive for mountain folds, negative for valleys.
-        bends: bends of a sheet.
         tabs: tabs for glue, beside the pieces.
         notes: what could not be met, one sentence each.
         settings: the options.
@@ -46,7 +45,6 @@ class Pattern:
     millimetres: float
     folds: IntArray = field(default_factory=lambda: np.empty((0, 2), dtype=np.int64))
     fold_angles: FloatArray = field(default_factory=lambda: np.empty(0))
-    bends: tuple[Bend, ...] = ()
     tabs: tuple[Tab, ...] = ()
     notes: tuple[str, ...] = ()
     settings: Mapping[str, Any] = field(default_factory=dict)
@@ -75,6 +73,11 @@ class Pattern:
     def darts(self) -> tuple[Seam, ...]:
         """The seams that end in a tip inside a piece; none in nets and sheets, which are not sewn."""
         return tuple(seam for seam in self.seams if seam.is_dart and self.is_sewn)
+
+    @cached_property
+    def bends(self) -> tuple[Bend, ...]:
+        """The bends of a sheet; none of other kinds, and of sheets that are stretched."""
+        return find_bends(self.surface) if self.kind == "sheet" else ()
 
     @cached_property
     def strains(self) -> FloatArray:

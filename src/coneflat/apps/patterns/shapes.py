@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ...base import FloatArray, IntArray
-from .allowances import polygon_of, shapely, united, widened
+from .allowances import polygon_of, united, widened
 from .borders import Borders, Side
 from .cut_surface import CutSurface
 from .finish import HEM, Finish
@@ -76,12 +75,6 @@ def piece_shapes(
             cut = united([cut, *(polygon_of([points]) for points in own_tabs)])
         shapes.append(PieceShape(rings, inside, cut, has_allowance or bool(own_tabs)))
     return shapes
-
-
-def piece_at(shapes: Sequence[PieceShape], place: FloatArray) -> int:
-    """Return the piece nearest to a place (2,) in the plane."""
-    point = shapely().Point(place)
-    return int(np.argmin([shape.inside.distance(point) for shape in shapes]))
 
 
 def tails(surface: CutSurface, halfedges: IntArray) -> IntArray:

@@ -133,9 +133,9 @@ def least_strain(
             gradient, hessian = model.derivatives(points, bounds)
             matrix = _with_pattern_of(_regularised(hessian[moving][:, moving]), matrix)
             factor = factorize(matrix, factor)
-            step = np.zeros(gradient.size)
-            step[moving] = -factor.solve(gradient[moving])
-            slope, step = float(gradient @ step), step.reshape(-1, 2)
+            shift = np.zeros(gradient.size)
+            shift[moving] = -factor.solve(gradient[moving])
+            slope, step = float(gradient @ shift), shift.reshape(-1, 2)
             length = _step_length(model, points, bounds, step, slope)
             points = points + length * step
             if length == 0 or -slope < GAIN * before:

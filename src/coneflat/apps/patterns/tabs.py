@@ -17,6 +17,7 @@ from ...mesh import NEXT, PREVIOUS, label_components
 from .borders import Borders, Side
 from .cut_surface import CutSurface
 from .development import MIN_FOLD_ANGLE
+from .tab_places import PlacedTabs, areas_of, largest_area, shrunk
 
 # Angle at the ends of a tab, radians; it is smaller where there is less room.
 END_ANGLE = np.pi / 4
@@ -30,8 +31,6 @@ MAX_INSETS = 0.9
 MIN_ANGLE = 0.02
 # Angle by which a side turns at a corner, radians.
 STRAIGHT = 1e-6
-# By how much tabs are shrunk in tests for collisions, relative to their size: they may touch.
-TOUCHING = 1e-6
 # Distance of the two sides of a seam, relative to its length, below which it is closed in the plane.
 CLOSED = 1e-5
 
@@ -186,8 +185,8 @@ class _Room:
         """Return the tabs: parts with the least room first, each on the side with more room that is left."""
         trapezoids = [[self._trapezoids(part, side) for side in (0, 1)] for part in self.parts]
         choices = self._free_of_pieces(trapezoids)
-        areas = [max(_area(sides[0][:1]), _area(sides[1][:1])) for sides in choices]
-        placed = _Placed(self.shapely)
+        areas = [max(largest_area(sides[0][:1]), largest_area(sides[1][:1])) for sides in choices]
+        placed = PlacedTabs(self.shapely)
         for number in np.argsort(np.round(areas, 9), kind="stable").tolist():
             if not placed.put(number, choices[number]):
                 placed.exchange(number, choices)
@@ -238,7 +237,7 @@ class _Room:
                     ]
                     trapezoids.append([start + x * along + y * outward for x, y in stations])
         polygons = np.unique(np.array(trapezoids).reshape(-1, 4, 2), axis=0)
-        return polygons[np.argsort(-np.round(_areas(polygons), 9), kind="stable")]
+        return polygons[np.argsort(-np.round(areas_of(polygons), 9), kind="stable")]
 
     def _end_angles(self, first: int, last: int, partners: IntArray) -> tuple[float, float]:
         """Return the largest angles of a tab at both ends: outside its piece, and of the face that it is glued to."""
@@ -265,7 +264,7 @@ class _Room:
         flat = np.concatenate(
             [polygons for sides in trapezoids for polygons in sides] or [np.empty((0, 4, 2))]
         )
-        hit = tree.query(self.shapely.polygons(_shrunk(flat)), predicate="intersects")[0]
+        hit = tree.query(self.shapely.polygons(shrunk(flat)), predicate="intersects")[0]
         is_free = np.ones(len(flat), dtype=bool)
         is_free[hit] = False
         sizes = [len(polygons) for sides in trapezoids for polygons in sides]
@@ -274,84 +273,3 @@ class _Room:
             [sides[0][parts[2 * number]], sides[1][parts[2 * number + 1]]]
             for number, sides in enumerate(trapezoids)
         ]
-
-
-class _Placed:
-    """Tabs that were placed.
-
-    Attributes:
-        items: the side and the polygon of each part with a tab.
-    """
-
-    def __init__(self, shapely: Any) -> None:
-        self.shapely = shapely
-        self.items: dict[int, tuple[int, FloatArray]] = {}
-        self.shapes: dict[int, Any] = {}
-        self.boxes: dict[int, FloatArray] = {}
-
-    def put(self, number: int, choices: list[FloatArray]) -> bool:
-        """Place the largest tab of a part that collides with no other; return whether there is one."""
-        ranked = sorted(
-            ((side, polygon) for side in (0, 1) for polygon in choices[side]),
-            key=lambda choice: -round(float(_areas(choice[1][None])[0]), 9),
-        )
-        for side, polygon in ranked:
-            if not self._blockers(polygon):
-                self._set(number, side, polygon)
-                return True
-        return False
-
-    def exchange(self, number: int, choices: list[list[FloatArray]]) -> bool:
-        """Place a tab where a single other one is in the way, which fits elsewhere; return whether that is possible."""
-        for side in (0, 1):
-            for polygon in choices[number][side]:
-                blockers = self._blockers(polygon)
-                if len(blockers) != 1:
-                    continue
-                blocker = blockers[0]
-                before = self.items[blocker]
-                self._remove(blocker)
-                self._set(number, side, polygon)
-                if self.put(blocker, choices[blocker]):
-                    return True
-                self._remove(number)
-                self._set(blocker, *before)
-        return False
-
-    def _set(self, number: int, side: int, polygon: FloatArray) -> None:
-        self.items[number] = side, polygon
-        self.shapes[number] = self.shapely.polygons(_shrunk(polygon[None])[0])
-        self.boxes[number] = np.concatenate([polygon.min(axis=0), -polygon.max(axis=0)])
-
-    def _remove(self, number: int) -> None:
-        del self.items[number], self.shapes[number], self.boxes[number]
-
-    def _blockers(self, polygon: FloatArray) -> list[int]:
-        """Return the parts whose tabs collide with a polygon."""
-        if not self.boxes:
-            return []
-        numbers = list(self.boxes)
-        boxes = np.array(list(self.boxes.values()))
-        low, high = polygon.min(axis=0), polygon.max(axis=0)
-        is_close = (boxes[:, :2] < high).all(axis=1) & (-boxes[:, 2:] > low).all(axis=1)
-        shape = self.shapely.polygons(_shrunk(polygon[None])[0])
-        return [
-            numbers[i] for i in np.flatnonzero(is_close).tolist() if self.shapes[numbers[i]].intersects(shape)
-        ]
-
-
-def _shrunk(polygons: FloatArray) -> FloatArray:
-    """Return polygons (k, 4, 2) that are a little smaller."""
-    centres = polygons.mean(axis=1, keepdims=True)
-    return centres + (1 - TOUCHING) * (polygons - centres)
-
-
-def _areas(polygons: FloatArray) -> FloatArray:
-    """Return (k,) the areas of polygons (k, 4, 2)."""
-    x, y = polygons[..., 0], polygons[..., 1]
-    return np.abs((x * np.roll(y, -1, axis=1) - y * np.roll(x, -1, axis=1)).sum(axis=1)) / 2
-
-
-def _area(polygons: FloatArray) -> float:
-    """Return the area of the first of polygons (k, 4, 2), 0 if there is none."""
-    return float(_areas(polygons)[0]) if len(polygons) else 0.0
