@@ -188,6 +188,6 @@ def letters(number: int) -> str:
     """Return A, B, ..., Z, AA, AB, ... for a number from 0."""
     name = ""
     while number >= 0:
-        number, rest = divmod(number, 26)
-        name, number = chr(ord("A") + rest) + name, number - 1
+        number, digit = divmod(number, 26)
+        name, number = chr(ord("A") + digit) + name, number - 1
     return name

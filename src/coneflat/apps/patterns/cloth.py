@@ -14,7 +14,7 @@ import numpy as np
 from ... import TriangleMesh, unwrap
 from ...base import BoolArray, FloatArray, IntArray, Unmet, has_any, mask_of, plural
 from ...geometry import angle_defect, corner_angles, edge_lengths
-from ...linalg.shortest_paths import MultiGraph
+from ...linalg import MultiGraph
 from ...mesh import label_components, nearby
 from .borders import find_borders
 from .cut_surface import CutSurface
@@ -22,6 +22,7 @@ from .development import Development
 from .options import PatternOptions
 from .relaxing import EVEN, SMALLEST, closed_seams, excess, relaxed
 from .separation import without_overlaps
+from .simplification import simplified
 from .small_pieces import without_small_pieces
 from .smooth_seams import with_smooth_seams
 from .strain import Stretch
@@ -45,15 +46,23 @@ def cloth_pieces(mesh: TriangleMesh, options: PatternOptions) -> Development:
     """Return a mesh cut into pieces of cloth, with smooth seams, and notes on bounds that were not met."""
     warp, weft = options.stretch_warp or options.strain, options.stretch_weft or options.strain
     stretch = Stretch(warp, weft)
+    notes = list[str]()
+    if options.seams is None:
+        coarse, distance = simplified(mesh, options.tolerance)
+        if coarse is not mesh:
+            notes.append(
+                f"The pattern is that of a mesh with {len(coarse.faces):,} instead of {len(mesh.faces):,} triangles, "
+                f"at most {distance:.2g} mm from it."
+            )
+        mesh = coarse
     surface = cut_cloth(mesh, stretch, seams=options.seams)
     if options.darts == "none":
         surface = without_darts(surface, stretch)
-    smooth = slit_until_within(with_smooth_seams(surface, options.smoothing), stretch)
+    smooth = slit_until_within(with_smooth_seams(surface, options.tolerance), stretch)
     if not excess(smooth, stretch).any() or excess(surface, stretch).any():
         surface = smooth
     surface = without_small_pieces(surface, stretch)
     beyond = excess(surface, stretch)
-    notes = []
     if beyond.any():
         reached = 100 * float(np.abs(surface.edges.strains(surface.points)).max())
         notes.append(
@@ -125,7 +134,7 @@ def without_darts(surface: CutSurface, stretch: Stretch) -> CutSurface:
 def slit_until_within(surface: CutSurface, stretch: Stretch) -> CutSurface:
     """Return a cut surface with slits from its seams, until its strain is within the bound, or no slit helps.
 
-    Slits end where the strain is concentrated if it is only moderately evened out: the more it is, the more edges have
+    Slits end where the strain is concentrated if it is only moderately even: the more even it is, the more edges have
     the largest one.
     """
     even = relaxed(surface, stretch, EVEN)
@@ -154,7 +163,7 @@ def _relaxed_near(
     """Return both layouts of a surface relaxed around new cuts (k,), the second from the first one there.
 
     Args:
-        even: the layout in which strain is evened out moderately.
+        even: the layout in which strain is moderately even.
         flat: the layout with the smallest largest strain.
         cuts: edges of the mesh.
         stretch: what the material allows.

@@ -92,10 +92,10 @@ def read_model(mesh: Any, faces: ArrayLike | None, options: PatternOptions) -> M
         OptionError: its size is not given.
         MeshError, MeshFileError: as for `coneflat.flatten`.
     """
-    given = as_input(mesh, faces)
-    checked = check_mesh(given.vertices, given.faces, repair=options.repair)
+    source = as_input(mesh, faces)
+    checked = check_mesh(source.vertices, source.faces, repair=options.repair)
     vertices = checked.mesh.vertices
-    ending = "" if given.source is None else given.source.path.suffix.lower()
+    ending = "" if source.source is None else source.source.path.suffix.lower()
     axis = AXES[upward_axis(vertices, checked.mesh.faces, ending)]
     if options.axis is not None:
         axis = np.array(options.axis) / np.linalg.norm(options.axis)
@@ -155,7 +155,7 @@ _METHODS: Mapping[str, Callable[[Model, PatternOptions], Development]] = {
 
 def _placed(model: Model, developed: Development, options: PatternOptions) -> Pattern:
     """Return the pattern of developed pieces, with glue tabs, placed side by side."""
-    # Gores are upright already.
+    # Gores stand along their axis already.
     surface = developed.surface if options.kind == "gores" else grain_up(developed.surface, model.axis)
     result = Pattern(
         kind=options.kind,

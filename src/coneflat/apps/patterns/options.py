@@ -32,7 +32,8 @@ class PatternOptions(RunOptions):
         stretch_weft: The same across the grain only.
         darts: auto: cuts that end inside a piece become darts. none: they go on to another border.
         seams: Edges that must be cut, as pairs of vertices; or input, for the seams of the UVs in the file.
-        smoothing: Largest distance from the surface to which seams are moved to make them smooth.
+        tolerance: Largest distance from the model up to which seams of cloth are made smooth, and dense meshes
+            simplified.
         gores: Number of strips from pole to pole.
         axis: Direction from pole to pole, and of the grain; by default the upward direction of the model.
         allowance: Width of the seam allowance: 7 mm for cloth and gores by default, else 0.
@@ -52,7 +53,7 @@ class PatternOptions(RunOptions):
     stretch_weft: float | None = option(None, Percentage(optional=True))
     darts: str = option("auto", Choice(("auto", "none")))
     seams: ArrayLike | str | None = option(None, Edges(("input",)), one_mesh=True)
-    smoothing: float = option(0.5, Length())
+    tolerance: float = option(0.5, Length())
     gores: int = option(12, Number(2, 1000, is_integer=True))
     axis: tuple[float, float, float] | None = option(None, Direction())
     allowance: float | None = option(None, Length(optional=True))

@@ -13,7 +13,7 @@ from ...errors import MetricError
 from .cut_surface import CutSurface
 from .strain import Stretch, least_strain, relative_strains, with_equal_sides
 
-#: Exponents of the strain: of layouts in which it is evened out moderately, and then for the smallest largest one.
+#: Exponents of the strain: of layouts in which it is moderately even, and then for the smallest largest one.
 EVEN, SMALLEST = (2, 4), (8, 16, 32)
 # Excess of the relative strain that is left to rounding.
 ROUNDING = 1e-9

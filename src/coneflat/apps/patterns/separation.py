@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ... import TriangleMesh
-from ...atlas.injective import injective_charts
+from ...atlas import injective_charts
 from ...base import IntArray
 from ...mesh import point_seams
 from .cut_surface import CutSurface

@@ -13,7 +13,7 @@ from .relaxing import EVEN, SMALLEST, closed_seams, excess, relaxed
 from .strain import Stretch
 
 # Largest area of a small piece, relative to that of all pieces.
-SMALL = 0.01
+MAX_SHARE = 0.01
 # Seams of a small piece at which it is joined to its neighbours, the longest first, and of all pieces.
 SEAMS, ALL_SEAMS = 2, 24
 # Rings of triangles around a joined piece whose points move.
@@ -52,7 +52,7 @@ def _candidates(surface: CutSurface) -> list[tuple[int, Seam]]:
                 by_piece.setdefault(piece, []).append(seam)
     candidates = []
     for piece in np.argsort(areas, kind="stable").tolist():
-        if areas[piece] < SMALL * areas.sum():
+        if areas[piece] < MAX_SHARE * areas.sum():
             longest = sorted(by_piece.get(piece, []), key=lambda seam: -seam.surface_length)
             candidates += [(piece, seam) for seam in longest[:SEAMS]]
     return candidates
@@ -60,13 +60,13 @@ def _candidates(surface: CutSurface) -> list[tuple[int, Seam]]:
 
 def _joined(surface: CutSurface, piece: int, seam: Seam, stretch: Stretch) -> CutSurface | None:
     """Return a surface with a piece sewn to another one along a seam, and relaxed around it."""
-    own, other = seam.sides if seam.sides[0].piece == piece else seam.sides[::-1]
+    moved, fixed = seam.sides if seam.sides[0].piece == piece else seam.sides[::-1]
     is_member = surface.pieces == piece
     places = surface.places.copy()
     places[is_member] = _moved_onto(
-        surface.points[own.points], surface.points[other.points[::-1]], places[is_member]
+        surface.points[moved.points], surface.points[fixed.points[::-1]], places[is_member]
     )
-    is_closed = mask_of(len(surface.mesh.edges), surface.mesh.halfedge_edges[own.halfedges])
+    is_closed = mask_of(len(surface.mesh.edges), surface.mesh.halfedge_edges[moved.halfedges])
     sewn = surface.cut_along(surface.seams[~is_closed[surface.seams]], places)
     if not (signed_double_areas(sewn.places) > 0).all():
         return None

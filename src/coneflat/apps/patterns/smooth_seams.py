@@ -95,12 +95,10 @@ def _is_far(
     before: FloatArray, after: FloatArray, faces: IntArray, tolerance: float, tree: TriangleTree
 ) -> BoolArray:
     """Return (m,) triangles that are farther from the surface before than the tolerance, or that left a part of it."""
-    middles = (after[faces] + after[faces[:, [1, 2, 0]]]) / 2
-    there = np.linalg.norm(
-        _nearest(tree, before, faces, middles.reshape(-1, 3)) - middles.reshape(-1, 3), axis=1
-    )
-    is_far = there.reshape(-1, 3).max(axis=1) > tolerance
+    middles = ((after[faces] + after[faces[:, [1, 2, 0]]]) / 2).reshape(-1, 3)
+    to_before = np.linalg.norm(_nearest(tree, before, faces, middles) - middles, axis=1)
     samples = np.concatenate([before[faces], (before[faces] + before[faces[:, [1, 2, 0]]]) / 2], axis=1)
-    near = _nearest(TriangleTree(after, faces), after, faces, samples.reshape(-1, 3))
-    back = np.linalg.norm(near - samples.reshape(-1, 3), axis=1).reshape(-1, 6).max(axis=1)
-    return is_far | (back > tolerance)
+    samples = samples.reshape(-1, 3)
+    to_after = np.linalg.norm(_nearest(TriangleTree(after, faces), after, faces, samples) - samples, axis=1)
+    distances = np.concatenate([to_before.reshape(-1, 3), to_after.reshape(-1, 6)], axis=1)
+    return distances.max(axis=1) > tolerance

@@ -36,9 +36,9 @@ class Length(Kind):
             return None
         length = length_of(value)
         if length is None or length < 0 or (self.is_positive and length == 0):
-            least = "above 0" if self.is_positive else "0 or more"
+            bound = "above 0" if self.is_positive else "0 or more"
             raise OptionError(
-                f"{name} must be a length, {least}, such as 7mm, 0.7cm or 0.25in, got {short_repr(value)}"
+                f"{name} must be a length, {bound}, such as 7mm, 0.7cm or 0.25in, got {short_repr(value)}"
             )
         return length
 
