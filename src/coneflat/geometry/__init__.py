@@ -49,6 +49,6 @@ __all__ = [
     "fill_orientations", "find_overlaps", "flat_triangles", "handle_loops", "halfedge_twins", "is_broken",
     "approximate_overlap_areas", "layout_curvature", "map_factors", "mean_energy", "mollify", "orientation",
     "qc_distortion", "quarters_around", "rest_sides", "rotated", "rotated_up", "sides_between", "signed_angles",
-    "signed_double_areas", "surface_distances", "triangle_energies", "turn", "unit_vectors", "vertex_log_scale", "vertex_normals",
-    "visible_share",
+    "signed_double_areas", "surface_distances", "triangle_energies", "turn", "unit_vectors",
+    "vertex_log_scale", "vertex_normals", "visible_share",
 ]  # fmt: skip
