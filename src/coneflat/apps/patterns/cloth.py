@@ -6,19 +6,21 @@ the nearest seam relax them. The energy is varied, and the shortest seams are ke
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
 from ... import TriangleMesh, unwrap
-from ...base import BoolArray, FloatArray, IntArray, Unmet, has_any, mask_of, plural
+from ...base import BoolArray, FloatArray, IntArray, Unmet, has_any, mask_of, part_of_work, plural
 from ...geometry import angle_defect, corner_angles, edge_lengths
 from ...linalg import MultiGraph
 from ...mesh import label_components, nearby
 from .borders import find_borders
 from .cut_surface import CutSurface
 from .development import Development
+from .model import Model
+from .nesting import grain_up
 from .options import PatternOptions
 from .relaxing import EVEN, SMALLEST, closed_seams, excess, relaxed
 from .separation import without_overlaps
@@ -34,6 +36,8 @@ ISOMETRIC = 4.0
 ENERGY_PER_STRAIN = 3.0
 # Textures that are tried: with twice the energy as long as seams get shorter, or half of it if the strain is too large.
 TEXTURES = 5
+# Fractions of the work that is left, for the progress, that one of them is, and smoothing.
+TEXTURE_SHARE, SMOOTHING_SHARE = 0.5, 0.7
 # Fraction of edges beyond the bound above which the seams of a texture are too few, so that slits cannot help.
 MAX_STRAINED = 0.15
 # Rings of triangles around new cuts whose points move.
@@ -42,57 +46,61 @@ RINGS = 16
 ROUNDS = 16
 
 
-def cloth_pieces(mesh: TriangleMesh, options: PatternOptions) -> Development:
-    """Return a mesh cut into pieces of cloth, with smooth seams, and notes on bounds that were not met."""
+def cloth_pieces(model: Model, options: PatternOptions) -> Development:
+    """Return a model cut into pieces of cloth with the grain upward, and notes on bounds that were not met."""
     warp, weft = options.stretch_warp or options.strain, options.stretch_weft or options.strain
     stretch = Stretch(warp, weft)
-    notes = list[str]()
-    if options.seams is None:
-        coarse, distance = simplified(mesh, options.tolerance)
-        if coarse is not mesh:
+    mesh, notes = model.mesh, list[str]()
+    if model.seams is None:
+        mesh, distance = simplified(model.mesh, options.tolerance)
+        if mesh is not model.mesh:
             notes.append(
-                f"The pattern is that of a mesh with {len(coarse.faces):,} instead of {len(mesh.faces):,} triangles, "
-                f"at most {distance:.2g} mm from it."
+                f"The pattern is that of a mesh with {len(mesh.faces):,} instead of {len(model.mesh.faces):,} "
+                f"triangles, at most {distance:.2g} mm from it."
             )
-        mesh = coarse
-    surface = cut_cloth(mesh, stretch, seams=options.seams)
-    if options.darts == "none":
-        surface = without_darts(surface, stretch)
-    smooth = slit_until_within(with_smooth_seams(surface, options.tolerance), stretch)
+    surface = cut_cloth(replace(model, mesh=mesh), stretch)
+    with part_of_work(SMOOTHING_SHARE, "smooth seams"):
+        smooth = slit_until_within(with_smooth_seams(surface, options.tolerance), stretch)
     if not excess(smooth, stretch).any() or excess(surface, stretch).any():
         surface = smooth
     surface = without_small_pieces(surface, stretch)
+    if options.darts == "none":
+        surface = without_darts(surface, stretch)
+    return Development(surface, notes=(*notes, *map(Unmet, _unmet(surface, stretch, options))))
+
+
+def _unmet(surface: CutSurface, stretch: Stretch, options: PatternOptions) -> Iterator[str]:
     beyond = excess(surface, stretch)
     if beyond.any():
         reached = 100 * float(np.abs(surface.edges.strains(surface.points)).max())
-        notes.append(
-            Unmet(
-                f"{plural(int((beyond > 0).sum()), 'edge')} of {len(beyond):,} are strained more than allowed, up to "
-                f"{reached:.2g} %, and no cut with less was found: allow more, or refine the mesh there."
-            )
+        yield (
+            f"{plural(int((beyond > 0).sum()), 'edge')} of {len(beyond):,} are strained more than allowed, up to "
+            f"{reached:.2g} %, and no cut with less was found: allow more, or refine the mesh there."
         )
-    return Development(surface, notes=tuple(notes))
+    darts = sum(seam.is_dart for seam in find_borders(surface).seams)
+    if options.darts == "none" and darts:
+        yield f"{plural(darts, 'dart')} could not be continued to a border: allow darts, or more strain."
 
 
-def cut_cloth(mesh: TriangleMesh, stretch: Stretch, seams: Any = None) -> CutSurface:
-    """Return a mesh cut into the pieces with the shortest seams that were found for a bound of the strain.
+def cut_cloth(model: Model, stretch: Stretch) -> CutSurface:
+    """Return a model cut into the pieces with the shortest seams that were found for a bound of the strain.
 
     If no cut within the bound was found, it is the one with the smallest largest strain.
-
-    Args:
-        mesh: the mesh.
-        stretch: the bound.
-        seams: edges that must be cut, as for `coneflat.unwrap`.
     """
-    first = ENERGY_PER_STRAIN * (stretch.warp**2 + stretch.weft**2) / 2
+    mesh, first = model.mesh, ENERGY_PER_STRAIN * (stretch.warp**2 + stretch.weft**2) / 2
     factor = 1.0
     shortest: CutSurface | None = None
     smallest: CutSurface | None = None
-    for _ in range(TEXTURES):
-        texture = unwrap(
-            mesh.vertices, mesh.faces, max_energy=ISOMETRIC + factor * first, packing_cuts=0.0, seams=seams
-        )
-        surface = slit_until_within(CutSurface.of(texture), stretch)
+    for number in range(TEXTURES):
+        with part_of_work(TEXTURE_SHARE, f"cut {number + 1}"):
+            texture = unwrap(
+                mesh.vertices,
+                mesh.faces,
+                max_energy=ISOMETRIC + factor * first,
+                packing_cuts=0.0,
+                seams=model.seams,
+            )
+            surface = slit_until_within(grain_up(CutSurface.of(texture), model.axis), stretch)
         beyond = excess(surface, stretch).max()
         if beyond == 0:
             if shortest is not None and surface.seam_length >= shortest.seam_length:
@@ -113,22 +121,41 @@ def cut_cloth(mesh: TriangleMesh, stretch: Stretch, seams: Any = None) -> CutSur
 
 
 def without_darts(surface: CutSurface, stretch: Stretch) -> CutSurface:
-    """Return a surface whose cuts that ended in a tip inside a piece go on to another border."""
-    while darts := [seam for seam in find_borders(surface).seams if seam.is_dart]:
-        dart = darts[0]
-        mesh, along = surface.mesh, surface.mesh.halfedge_edges[dart.sides[0].halfedges]
-        tip = int(surface.mesh.faces.ravel()[np.flatnonzero(surface.corners.ravel() == dart.tip)[0]])
+    """Return a surface whose cuts that ended in a tip inside a piece go on to another border.
+
+    As further cuts may be needed for the strain, darts may remain after some rounds.
+    """
+    for _ in range(ROUNDS):
+        longer = _with_longer_darts(surface)
+        if len(longer.seams) == len(surface.seams):
+            break
+        surface = slit_until_within(longer, stretch)
+    return surface
+
+
+def _with_longer_darts(surface: CutSurface) -> CutSurface:
+    """Return a surface with all darts cut on to the nearest border that is not their own."""
+    mesh, vertex = surface.mesh, surface.vertex_of_point
+    unreached = set[int]()
+    while darts := [
+        seam
+        for seam in find_borders(surface).seams
+        if seam.tip is not None and vertex[seam.tip] not in unreached
+    ]:
+        tip = int(vertex[darts[0].tip])
         costs = surface.edge_lengths.copy()
         costs[surface.seams] = np.inf
         is_goal = surface.is_border_vertex.copy()
-        is_goal[mesh.edges[along]] = False
+        is_goal[mesh.edges[mesh.halfedge_edges[darts[0].sides[0].halfedges]]] = False
         graph = MultiGraph(len(mesh.vertices), mesh.edges, costs, mesh.incident_edges)
         paths = graph.shortest_paths(np.flatnonzero(is_goal))
         nodes = paths.nodes_to(np.array([tip]))
-        if not len(nodes):
-            break
-        surface = surface.cut_along(np.union1d(surface.seams, paths.edge[nodes]))
-    return slit_until_within(surface, stretch)
+        if len(nodes):
+            surface = surface.cut_along(np.union1d(surface.seams, paths.edge[nodes]))
+            vertex = surface.vertex_of_point
+        else:
+            unreached.add(tip)
+    return surface
 
 
 def slit_until_within(surface: CutSurface, stretch: Stretch) -> CutSurface:

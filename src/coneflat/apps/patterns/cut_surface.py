@@ -10,7 +10,7 @@ import numpy as np
 from ... import Flattening, TriangleMesh
 from ...base import BoolArray, FloatArray, IntArray, mask_of
 from ...geometry import find_overlaps
-from ...mesh import label_faces, open_along, point_seams
+from ...mesh import label_faces, open_along, point_seams, point_vertices
 from .strain import FlatEdges
 
 
@@ -59,6 +59,11 @@ class CutSurface:
     def is_border_vertex(self) -> BoolArray:
         """(n,) vertices on seams or on the border of the mesh."""
         return mask_of(len(self.mesh.vertices), self.mesh.edges[self.seams]) | self.mesh.is_boundary_vertex
+
+    @cached_property
+    def vertex_of_point(self) -> IntArray:
+        """(u,) the vertex of each point."""
+        return point_vertices(self.mesh.faces, self.corners, len(self.points))
 
     @cached_property
     def pieces(self) -> IntArray:

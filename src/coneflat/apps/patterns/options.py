@@ -65,3 +65,7 @@ class PatternOptions(RunOptions):
     def __post_init__(self) -> None:
         if self.height is not None and (self.unit is not None or self.scale != 1.0):
             raise OptionError("height and unit or scale cannot be combined: leave out one of them")
+        if self.seams is not None and self.kind != "cloth":
+            raise OptionError(f"seams and kind {self.kind} cannot be combined: only cloth takes seams")
+        if self.lengths is not None:
+            raise OptionError("lengths and patterns cannot be combined: leave out lengths")

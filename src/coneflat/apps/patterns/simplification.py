@@ -8,8 +8,8 @@ from ... import TriangleMesh
 from ...base import FloatArray, IntArray
 from ...geometry import coarse_mesh, surface_distances
 
-# Numbers of triangles of a simplified mesh that are tried; one with fewer triangles than MANY is left as it is.
-COUNTS, MANY = (6_000, 12_000, 24_000), 10_000
+# Numbers of triangles of a simplified mesh that are tried; one with fewer than LEAST_TRIANGLES is left as it is.
+COUNTS, LEAST_TRIANGLES = (6_000, 12_000, 24_000), 10_000
 
 
 def simplified(mesh: TriangleMesh, tolerance: float) -> tuple[TriangleMesh, float]:
@@ -21,7 +21,7 @@ def simplified(mesh: TriangleMesh, tolerance: float) -> tuple[TriangleMesh, floa
             change. If the smallest number of triangles within it is no less than half of those of the mesh, it remains.
     """
     for count in COUNTS:
-        if tolerance == 0 or len(mesh.faces) < max(MANY, 2 * count):
+        if tolerance == 0 or len(mesh.faces) < max(LEAST_TRIANGLES, 2 * count):
             break
         coarse = _simplified_parts(mesh, count)
         distance = _largest_distance(mesh, coarse)
