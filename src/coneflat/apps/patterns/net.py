@@ -21,7 +21,9 @@ from .polyhedron import DIGITS, Polyhedron
 
 # Comparisons of boxes per triangle, about ten nanoseconds each: for untangling one tree of all faces, for each attempt
 # to join two pieces, for all of these attempts, and for exchanging joined hinges for longer ones.
-TREE_BUDGET, JOIN_BUDGET, ALL_JOINS_BUDGET, EXCHANGE_BUDGET = 600_000, 30_000, 600_000, 600_000
+TREE_BUDGET, JOIN_BUDGET, ALL_JOINS_BUDGET, EXCHANGE_BUDGET = 250_000, 30_000, 600_000, 600_000
+# Spanning trees from which the search starts, one after the other, until no collision remains.
+STARTS = 4
 # Triangles above which budgets do not grow.
 MAX_BUDGET_TRIANGLES = 2000
 # Depths up to which triangles touch and do not overlap, relative to the root of the area of the surface. The second is
@@ -127,19 +129,31 @@ class _Search:
         """Return the placement with the fewest pieces that was found."""
         trees = [self._spanning_forest(weight) for weight in weights]
         counts = [self._placed(tree) for tree in trees]
-        best = int(np.argmin(counts))
-        number = self._placed(trees[best])
+        ranked = [trees[i] for i in np.argsort(counts, kind="stable")[:STARTS]]
+        number = self._placed(ranked[0])
         if number:
-            tree = np.empty_like(trees[best])
-            untangle(self.faces, self.net, self.lengths, number, self.scale * TREE_BUDGET, self.work, tree)
-            number = self._placed(tree)
-            cut_collisions(self.faces, self.net, self.lengths, number, self.work)
-            place_pieces(self.faces, self.net, self.work.walk)
+            number = self._placed(self._untangled(ranked))
+            while number:  # Once, unless there are too many to list.
+                cut_collisions(self.faces, self.net, self.lengths, number, self.work)
+                number = place_and_collide(self.faces, self.net, self.work)
             self._exchange(1)
             self._join_pieces()
         self._exchange(10)
         place_pieces(self.faces, self.net, self.work.walk)
         return self.net
+
+    def _untangled(self, trees: Sequence[BoolArray]) -> BoolArray:
+        """Return (h,) the joined hinges with the fewest collisions, from several trees one after the other."""
+        best, fewest = trees[0], None
+        for tree in trees:
+            number, result = self._placed(tree), np.empty_like(tree)
+            budget = self.scale * TREE_BUDGET
+            number, _ = untangle(self.faces, self.net, self.lengths, number, budget, self.work, result)
+            if fewest is None or number < fewest:
+                best, fewest = result, number
+            if number == 0:
+                break
+        return best
 
     def _spanning_forest(self, weight: FloatArray) -> BoolArray:
         """Return (h,) the hinges of the spanning forest that joins those of small weight."""

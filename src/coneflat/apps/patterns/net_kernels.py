@@ -235,7 +235,7 @@ def find_collisions(
                 if triangles_overlap(faces, t, net.triangles[t], u, space.triangles[k]):
                     pairs[number, 0], pairs[number, 1] = t, u
                     number += 1
-                    if number == limit:
+                    if number >= limit:
                         return number, comparisons
     return number, comparisons
 
