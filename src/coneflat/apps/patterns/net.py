@@ -252,5 +252,5 @@ def _joined(mesh: TriangleMesh, places: FloatArray, piece: IntArray) -> CutSurfa
     lengths = np.linalg.norm(ends[:, 0] - starts[:, 0], axis=1)
     is_joined = (piece[mesh.edge_faces[:, 0]] == piece[mesh.edge_faces[:, 1]]) & (gap <= JOIN_GAP * lengths)
     seams = np.flatnonzero(~is_joined & ~mesh.is_boundary_edge)
-    whole = CutSurface(mesh, mesh.faces, np.zeros((len(mesh.vertices), 2)))
-    return whole.cut_along(seams, places)
+    closed = CutSurface(mesh, mesh.faces, np.zeros((len(mesh.vertices), 2)))
+    return closed.cut_along(seams, places)
