@@ -26,9 +26,9 @@ TREE_BUDGET, JOIN_BUDGET, ALL_JOINS_BUDGET, EXCHANGE_BUDGET = 250_000, 30_000, 6
 STARTS = 4
 # Triangles above which budgets do not grow.
 MAX_BUDGET_TRIANGLES = 2000
-# Depths up to which triangles touch and do not overlap, relative to the root of the area of the surface. The second is
-# a third of a micrometre where that is 300 mm: coordinates of single precision may need it along divided edges.
-TOUCHING, NOISY_TOUCHING = 1e-11, 1e-6
+# Depth up to which triangles touch and do not overlap, relative to the root of the area of the surface; and the largest
+# one if edges are divided, where it is twice the gap that the rounding of the coordinates of the model leaves there.
+TOUCHING, MAX_TOUCHING = 1e-11, 1e-6
 # Collisions with which two pieces may be joined before they are untangled.
 JOINED_COLLISIONS = 12
 # Hinges between two pieces at which they are joined and untangled.
@@ -59,14 +59,14 @@ def unfold_net(mesh: TriangleMesh) -> Development:
     faces, order = _faces(polyhedron, unit)
     lengths = np.round(polyhedron.hinge_lengths / unit, DIGITS)
     weights = list(_weights(polyhedron))
-    search = _Search(faces, lengths)
-    net = search.fewest_pieces(weights)
-    if net.piece.max() + 1 > search.component_count and polyhedron.has_divided_edges:
-        noisy = _Search(faces._replace(touching=NOISY_TOUCHING), lengths).fewest_pieces(weights)
-        net = min(net, noisy, key=lambda placement: int(placement.piece.max()))
+    touching = float(np.clip(2 * polyhedron.division_gap / unit, TOUCHING, MAX_TOUCHING))
+    net = _Search(faces._replace(touching=touching), lengths).fewest_pieces(weights)
     places = np.empty((len(order), 3, 2))
     places[order] = net.triangles.reshape(-1, 3, 2) * unit
-    surface = _joined(mesh, places, net.piece[polyhedron.face])
+    hinge = polyhedron.hinge_of_edge
+    is_unfolded = (hinge >= 0) & np.append(net.is_joined, False)[hinge]
+    gaps = np.where(is_unfolded, touching * unit, 0.0)
+    surface = _joined(mesh, places, net.piece[polyhedron.face], gaps)
     folds, angles = find_folds(surface)
     return Development(surface, folds, angles)
 
@@ -241,8 +241,15 @@ class _Search:
         return False, spent
 
 
-def _joined(mesh: TriangleMesh, places: FloatArray, piece: IntArray) -> CutSurface:
-    """Return the cut surface of placed triangles: edges of a piece whose two sides coincide are joined."""
+def _joined(mesh: TriangleMesh, places: FloatArray, piece: IntArray, gaps: FloatArray) -> CutSurface:
+    """Return the cut surface of placed triangles: edges of a piece whose two sides coincide are joined.
+
+    Args:
+        mesh: the mesh.
+        places: (m, 3, 2) the corners of its triangles in the plane.
+        piece: (m,) the piece of each triangle.
+        gaps: (e,) gaps that are closed in any case.
+    """
     halfedges = mesh.edge_halfedges
     triangle, corner = halfedges // 3, halfedges % 3
     starts, ends = places[triangle, (corner + 1) % 3], places[triangle, (corner + 2) % 3]
@@ -250,7 +257,9 @@ def _joined(mesh: TriangleMesh, places: FloatArray, piece: IntArray) -> CutSurfa
         np.linalg.norm(starts[:, 0] - ends[:, 1], axis=1), np.linalg.norm(ends[:, 0] - starts[:, 1], axis=1)
     )
     lengths = np.linalg.norm(ends[:, 0] - starts[:, 0], axis=1)
-    is_joined = (piece[mesh.edge_faces[:, 0]] == piece[mesh.edge_faces[:, 1]]) & (gap <= JOIN_GAP * lengths)
+    is_joined = (piece[mesh.edge_faces[:, 0]] == piece[mesh.edge_faces[:, 1]]) & (
+        gap <= np.maximum(JOIN_GAP * lengths, gaps)
+    )
     seams = np.flatnonzero(~is_joined & ~mesh.is_boundary_edge)
     closed = CutSurface(mesh, mesh.faces, np.zeros((len(mesh.vertices), 2)))
     return closed.cut_along(seams, places)
