@@ -118,6 +118,16 @@ def test_far_from_the_origin():
     checked(mesh.moved_to(mesh.vertices + 1e4))
 
 
+def test_edges_of_divided_faces_remain_joined_despite_the_rounding_of_coordinates():
+    """Coordinates of single precision, as in STL files: the parts of an edge are not quite on a line."""
+    vertices, faces = box(5)
+    rounded = (vertices @ rotation().T).astype(np.float32).astype(float)
+    surface = unfold_net(check_mesh(rounded, faces).mesh).surface
+    assert surface.pieces.max() == 0
+    assert surface.seam_length == pytest.approx(unfold_net(check_mesh(*box(5)).mesh).surface.seam_length)
+    assert np.abs(surface.edges.strains(surface.points)).max() < 1e-5
+
+
 def test_a_model_of_many_facets_is_one_piece():
     model = coneflat.read_mesh(coneflat.sample_path())
     mesh = coarse_mesh(check_mesh(model.vertices, model.triangles).mesh, 600).mesh

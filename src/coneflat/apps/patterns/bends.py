@@ -69,14 +69,14 @@ class _Crease:
         along = self.line[1] - self.line[0]
         return along / np.linalg.norm(along)
 
-    def is_parallel_to(self, other: _Crease) -> bool:
+    def is_parallel_to(self, crease: _Crease) -> bool:
         """Return whether another crease has the same direction."""
-        a, b = self.direction, other.direction
+        a, b = self.direction, crease.direction
         return bool(abs(a[0] * b[1] - a[1] * b[0]) <= PARALLEL)
 
-    def distance_to(self, other: _Crease) -> float:
+    def distance_to(self, crease: _Crease) -> float:
         """Return the distance of the middle of another crease from the line of this one."""
-        a, b = self.direction, other.middle - self.middle
+        a, b = self.direction, crease.middle - self.middle
         return float(abs(a[0] * b[1] - a[1] * b[0]))
 
 

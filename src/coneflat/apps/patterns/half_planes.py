@@ -133,7 +133,7 @@ def _divided(vertices: FloatArray, faces: IntArray, middle: IntArray) -> IntArra
         middle: (m, 3) the vertex on the side opposite each corner, -1 for none; two sides at most have one.
     """
     count = (middle >= 0).sum(axis=1)
-    whole, single, double = (np.flatnonzero(count == number) for number in range(3))
+    undivided, single, double = (np.flatnonzero(count == number) for number in range(3))
     # Corner a is opposite the side with the vertex p.
     corner = (middle[single] >= 0).argmax(axis=1)
     a, b, c = (faces[single, (corner + i) % 3] for i in range(3))
@@ -150,4 +150,4 @@ def _divided(vertices: FloatArray, faces: IntArray, middle: IntArray) -> IntArra
         np.where(is_b, np.stack([q, b, p], axis=1), np.stack([q, b, c], axis=1)),
         np.where(is_b, np.stack([b, c, p], axis=1), np.stack([q, c, p], axis=1)),
     ]
-    return np.concatenate([faces[whole], *halves, *thirds])
+    return np.concatenate([faces[undivided], *halves, *thirds])

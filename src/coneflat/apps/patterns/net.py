@@ -21,12 +21,14 @@ from .polyhedron import DIGITS, Polyhedron
 
 # Comparisons of boxes per triangle, about ten nanoseconds each: for untangling one tree of all faces, for each attempt
 # to join two pieces, for all of these attempts, and for exchanging joined hinges for longer ones.
-TREE_BUDGET, JOIN_BUDGET, ALL_JOINS_BUDGET, EXCHANGE_BUDGET = 600_000, 30_000, 600_000, 600_000
+TREE_BUDGET, JOIN_BUDGET, ALL_JOINS_BUDGET, EXCHANGE_BUDGET = 250_000, 30_000, 600_000, 600_000
+# Spanning trees from which the search starts, one after the other, until no collision remains.
+STARTS = 4
 # Triangles above which budgets do not grow.
 MAX_BUDGET_TRIANGLES = 2000
-# Depths up to which triangles touch and do not overlap, relative to the root of the area of the surface. The second is
-# a third of a micrometre where that is 300 mm: coordinates of single precision may need it along divided edges.
-TOUCHING, NOISY_TOUCHING = 1e-11, 1e-6
+# Depth up to which triangles touch and do not overlap, relative to the root of the area of the surface; and the largest
+# one if edges are divided, where it is twice the gap that the rounding of the coordinates of the model leaves there.
+TOUCHING, MAX_TOUCHING = 1e-11, 1e-6
 # Collisions with which two pieces may be joined before they are untangled.
 JOINED_COLLISIONS = 12
 # Hinges between two pieces at which they are joined and untangled.
@@ -57,14 +59,14 @@ def unfold_net(mesh: TriangleMesh) -> Development:
     faces, order = _faces(polyhedron, unit)
     lengths = np.round(polyhedron.hinge_lengths / unit, DIGITS)
     weights = list(_weights(polyhedron))
-    search = _Search(faces, lengths)
-    net = search.fewest_pieces(weights)
-    if net.piece.max() + 1 > search.component_count and polyhedron.has_divided_edges:
-        noisy = _Search(faces._replace(touching=NOISY_TOUCHING), lengths).fewest_pieces(weights)
-        net = min(net, noisy, key=lambda placement: int(placement.piece.max()))
+    touching = float(np.clip(2 * polyhedron.division_gap / unit, TOUCHING, MAX_TOUCHING))
+    net = _Search(faces._replace(touching=touching), lengths).fewest_pieces(weights)
     places = np.empty((len(order), 3, 2))
     places[order] = net.triangles.reshape(-1, 3, 2) * unit
-    surface = _joined(mesh, places, net.piece[polyhedron.face])
+    hinge = polyhedron.hinge_of_edge
+    is_unfolded = (hinge >= 0) & np.append(net.is_joined, False)[hinge]
+    gaps = np.where(is_unfolded, touching * unit, 0.0)
+    surface = _joined(mesh, places, net.piece[polyhedron.face], gaps)
     folds, angles = find_folds(surface)
     return Development(surface, folds, angles)
 
@@ -127,19 +129,31 @@ class _Search:
         """Return the placement with the fewest pieces that was found."""
         trees = [self._spanning_forest(weight) for weight in weights]
         counts = [self._placed(tree) for tree in trees]
-        best = int(np.argmin(counts))
-        number = self._placed(trees[best])
+        ranked = [trees[i] for i in np.argsort(counts, kind="stable")[:STARTS]]
+        number = self._placed(ranked[0])
         if number:
-            tree = np.empty_like(trees[best])
-            untangle(self.faces, self.net, self.lengths, number, self.scale * TREE_BUDGET, self.work, tree)
-            number = self._placed(tree)
-            cut_collisions(self.faces, self.net, self.lengths, number, self.work)
-            place_pieces(self.faces, self.net, self.work.walk)
+            number = self._placed(self._untangled(ranked))
+            while number:  # Once, unless there are too many to list.
+                cut_collisions(self.faces, self.net, self.lengths, number, self.work)
+                number = place_and_collide(self.faces, self.net, self.work)
             self._exchange(1)
             self._join_pieces()
         self._exchange(10)
         place_pieces(self.faces, self.net, self.work.walk)
         return self.net
+
+    def _untangled(self, trees: Sequence[BoolArray]) -> BoolArray:
+        """Return (h,) the joined hinges with the fewest collisions, from several trees one after the other."""
+        best, fewest = trees[0], None
+        for tree in trees:
+            number, result = self._placed(tree), np.empty_like(tree)
+            budget = self.scale * TREE_BUDGET
+            number, _ = untangle(self.faces, self.net, self.lengths, number, budget, self.work, result)
+            if fewest is None or number < fewest:
+                best, fewest = result, number
+            if number == 0:
+                break
+        return best
 
     def _spanning_forest(self, weight: FloatArray) -> BoolArray:
         """Return (h,) the hinges of the spanning forest that joins those of small weight."""
@@ -227,8 +241,15 @@ class _Search:
         return False, spent
 
 
-def _joined(mesh: TriangleMesh, places: FloatArray, piece: IntArray) -> CutSurface:
-    """Return the cut surface of placed triangles: edges of a piece whose two sides coincide are joined."""
+def _joined(mesh: TriangleMesh, places: FloatArray, piece: IntArray, gaps: FloatArray) -> CutSurface:
+    """Return the cut surface of placed triangles: edges of a piece whose two sides coincide are joined.
+
+    Args:
+        mesh: the mesh.
+        places: (m, 3, 2) the corners of its triangles in the plane.
+        piece: (m,) the piece of each triangle.
+        gaps: (e,) gaps that are closed in any case.
+    """
     halfedges = mesh.edge_halfedges
     triangle, corner = halfedges // 3, halfedges % 3
     starts, ends = places[triangle, (corner + 1) % 3], places[triangle, (corner + 2) % 3]
@@ -236,7 +257,9 @@ def _joined(mesh: TriangleMesh, places: FloatArray, piece: IntArray) -> CutSurfa
         np.linalg.norm(starts[:, 0] - ends[:, 1], axis=1), np.linalg.norm(ends[:, 0] - starts[:, 1], axis=1)
     )
     lengths = np.linalg.norm(ends[:, 0] - starts[:, 0], axis=1)
-    is_joined = (piece[mesh.edge_faces[:, 0]] == piece[mesh.edge_faces[:, 1]]) & (gap <= JOIN_GAP * lengths)
+    is_joined = (piece[mesh.edge_faces[:, 0]] == piece[mesh.edge_faces[:, 1]]) & (
+        gap <= np.maximum(JOIN_GAP * lengths, gaps)
+    )
     seams = np.flatnonzero(~is_joined & ~mesh.is_boundary_edge)
-    whole = CutSurface(mesh, mesh.faces, np.zeros((len(mesh.vertices), 2)))
-    return whole.cut_along(seams, places)
+    closed = CutSurface(mesh, mesh.faces, np.zeros((len(mesh.vertices), 2)))
+    return closed.cut_along(seams, places)

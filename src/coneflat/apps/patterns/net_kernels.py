@@ -91,16 +91,16 @@ def walk_joined(faces: Faces, is_joined: BoolArray, start: int, barred: int, wal
 def attach(faces: Faces, frames: FloatArray, hinge: int, fixed: int, frame: FloatArray) -> None:
     """Write the frame (4,) of the face at a hinge that is unfolded next to a fixed one."""
     side = 0 if faces.hinge_faces[hinge, 0] == fixed else 1
-    here, there = faces.hinge_ends[hinge, side], faces.hinge_ends[hinge, 1 - side]
+    fixed_ends, moving_ends = faces.hinge_ends[hinge, side], faces.hinge_ends[hinge, 1 - side]
     c, s = frames[fixed, 0], frames[fixed, 1]
-    x, y = (here[0] + here[2]) / 2, (here[1] + here[3]) / 2
-    u, v = here[2] - here[0], here[3] - here[1]
+    x, y = (fixed_ends[0] + fixed_ends[2]) / 2, (fixed_ends[1] + fixed_ends[3]) / 2
+    u, v = fixed_ends[2] - fixed_ends[0], fixed_ends[3] - fixed_ends[1]
     target_u, target_v = c * u - s * v, s * u + c * v
-    local_u, local_v = there[2] - there[0], there[3] - there[1]
+    local_u, local_v = moving_ends[2] - moving_ends[0], moving_ends[3] - moving_ends[1]
     cosine, sine = local_u * target_u + local_v * target_v, local_u * target_v - local_v * target_u
     size = math.hypot(cosine, sine)
     frame[0], frame[1] = cosine / size, sine / size
-    local_x, local_y = (there[0] + there[2]) / 2, (there[1] + there[3]) / 2
+    local_x, local_y = (moving_ends[0] + moving_ends[2]) / 2, (moving_ends[1] + moving_ends[3]) / 2
     frame[2] = c * x - s * y + frames[fixed, 2] - (frame[0] * local_x - frame[1] * local_y)
     frame[3] = s * x + c * y + frames[fixed, 3] - (frame[1] * local_x + frame[0] * local_y)
 
@@ -235,7 +235,7 @@ def find_collisions(
                 if triangles_overlap(faces, t, net.triangles[t], u, space.triangles[k]):
                     pairs[number, 0], pairs[number, 1] = t, u
                     number += 1
-                    if number == limit:
+                    if number >= limit:
                         return number, comparisons
     return number, comparisons
 

@@ -64,7 +64,7 @@ def untangle(
             resolved += is_first != (work.walk.place[work.owner[work.pairs[i, 1]]] >= 0)
         temperature = HOT * (1 - (spent % CYCLE) / CYCLE)
         slack = int(-temperature * math.log((1 + random_below(work.seed, 1 << 30)) / (1 << 30)))
-        limit = min(resolved + slack + 1, len(work.pairs) - number)
+        limit = min(resolved + slack + 1, len(work.pairs) - number + resolved)
         choices = list_candidates(faces, count, cut, work)
         chosen, least_added = -1, limit
         for i in range(min(choices, TRIED_HINGES)):

@@ -61,18 +61,50 @@ class Polyhedron:
         """(h, 2) the faces at each hinge."""
         return self.face[self.mesh.edge_faces[self.hinges]]
 
-    @property
-    def has_divided_edges(self) -> bool:
-        """Whether two adjacent faces have several edges in common."""
-        ends = self.mesh.vertices[self.mesh.edges[self.hinges]]
-        lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
-        return bool((self.hinge_lengths > 1.0001 * lengths).any())
+    @cached_property
+    def hinge_of_edge(self) -> IntArray:
+        """(e,) the hinge between the faces of each edge; -1 on the boundary and inside faces."""
+        if not len(self.hinges):
+            return np.full(len(self.mesh.edges), -1)
+        count = int(self.face.max()) + 1
+        keys, hinge_keys = (
+            np.sort(pairs, axis=1) @ [count, 1]
+            for pairs in (self.face[self.mesh.edge_faces], self.hinge_faces)
+        )
+        hinge = np.minimum(np.searchsorted(hinge_keys, keys), len(hinge_keys) - 1)
+        return np.where((hinge_keys[hinge] == keys) & ~self.mesh.is_boundary_edge, hinge, -1)
 
     @cached_property
     def hinge_ends(self) -> FloatArray:
         """(h, 2, 2, 2) the ends of each hinge in the frames of its two faces, in the same order."""
-        halfedges = self.mesh.edge_halfedges[self.hinges]
-        triangle, corner = halfedges // 3, halfedges % 3
+        return self._ends(self.hinges)
+
+    @cached_property
+    def division_gap(self) -> float:
+        """The largest gap between the two sides of edges where faces are unfolded about their hinges.
+
+        Two faces have several edges in common where triangles divide them. Their sides fit but for the rounding of the
+        coordinates of the model.
+        """
+        edges = np.flatnonzero(self.hinge_of_edge >= 0)
+        edges = edges[self.hinges[self.hinge_of_edge[edges]] != edges]
+        if not len(edges):
+            return 0.0
+        hinge = self.hinge_of_edge[edges]
+        ends = self._ends(edges)
+        is_swapped = self.face[self.mesh.edge_faces[edges, 0]] != self.hinge_faces[hinge, 0]
+        ends[is_swapped] = ends[is_swapped][:, ::-1]
+        first, second = (ends @ [1, 1j]).transpose(1, 0, 2)
+        (a, b), (c, d) = (self.hinge_ends[hinge] @ [1, 1j]).transpose(1, 2, 0)
+        turn = (b - a) / (d - c)
+        unfolded = (
+            turn[:, None] / np.abs(turn)[:, None] * (second - (c + d)[:, None] / 2) + (a + b)[:, None] / 2
+        )
+        return float(np.abs(unfolded - first).max())
+
+    def _ends(self, edges: IntArray) -> FloatArray:
+        """Return (k, 2, 2, 2) the ends of edges (k,) in the frames of their two faces, in the same order."""
+        triangle, corner = np.divmod(self.mesh.edge_halfedges[edges], 3)
         starts, ends = self.places[triangle, (corner + 1) % 3], self.places[triangle, (corner + 2) % 3]
         return np.stack(
             [np.stack([starts[:, 0], ends[:, 0]], axis=1), np.stack([ends[:, 1], starts[:, 1]], axis=1)],
