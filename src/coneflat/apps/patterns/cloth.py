@@ -63,7 +63,8 @@ def cloth_pieces(model: Model, options: PatternOptions) -> Development:
         smooth = slit_until_within(with_smooth_seams(surface, options.tolerance), stretch)
     if not excess(smooth, stretch).any() or excess(surface, stretch).any():
         surface = smooth
-    surface = without_small_pieces(surface, stretch)
+    required = np.empty((0, 2), dtype=np.int64) if model.seams is None else model.seams
+    surface = without_small_pieces(surface, stretch, required)
     if options.darts == "none":
         surface = without_darts(surface, stretch)
     return Development(surface, notes=(*notes, *map(Unmet, _unmet(surface, stretch, options))))

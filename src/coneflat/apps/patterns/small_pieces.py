@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...base import FloatArray, mask_of
+from ...base import FloatArray, IntArray, mask_of
 from ...geometry import signed_double_areas
-from ...mesh import nearby
+from ...mesh import are_among, nearby
 from .borders import Seam, find_borders
 from .cut_surface import CutSurface
 from .relaxing import EVEN, SMALLEST, closed_seams, excess, relaxed
@@ -20,15 +20,20 @@ SEAMS, ALL_SEAMS = 2, 24
 RINGS = 6
 
 
-def without_small_pieces(surface: CutSurface, stretch: Stretch) -> CutSurface:
+def without_small_pieces(surface: CutSurface, stretch: Stretch, required: IntArray) -> CutSurface:
     """Return a cut surface with as many of the small pieces joined to others as possible without overlaps.
 
     No edge is strained more than allowed that was not before.
+
+    Args:
+        surface: the surface.
+        stretch: what the material allows.
+        required: (k, 2) the vertices of edges that remain cut.
     """
     allowed = excess(surface, stretch).max()
     tries = 0
     while tries < ALL_SEAMS:
-        for piece, seam in _candidates(surface):
+        for piece, seam in _candidates(surface, required):
             tries += 1
             joined = _joined(surface, piece, seam, stretch)
             if joined is not None and excess(joined, stretch).max() <= allowed and not len(joined.overlaps()):
@@ -41,13 +46,15 @@ def without_small_pieces(surface: CutSurface, stretch: Stretch) -> CutSurface:
     return surface
 
 
-def _candidates(surface: CutSurface) -> list[tuple[int, Seam]]:
+def _candidates(surface: CutSurface, required: IntArray) -> list[tuple[int, Seam]]:
     """Return small pieces with their longest seams to others, the smallest piece first."""
     areas = np.bincount(surface.pieces, surface.edges.double_areas)
+    is_required = are_among(surface.mesh.edges, required)
     by_piece: dict[int, list[Seam]] = {}
     for seam in find_borders(surface).seams:
         first, second = (side.piece for side in seam.sides)
-        if first != second:
+        may_close = not is_required[surface.mesh.halfedge_edges[seam.sides[0].halfedges]].any()
+        if first != second and may_close:
             for piece in (first, second):
                 by_piece.setdefault(piece, []).append(seam)
     candidates = []

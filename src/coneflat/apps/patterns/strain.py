@@ -8,7 +8,7 @@ import numpy as np
 from scipy.sparse import csc_matrix, csr_matrix, diags, eye
 
 from ... import TriangleMesh
-from ...base import BoolArray, FloatArray, IntArray
+from ...base import BoolArray, FloatArray, IntArray, has_any, mask_of
 from ...errors import MetricError
 from ...geometry import double_areas, edge_lengths, signed_double_areas
 from ...linalg import Factor, factorize
@@ -62,6 +62,20 @@ class FlatEdges:
         partners = np.stack([order[:-1][is_pair], order[1:][is_pair]], axis=1)
         lengths = np.linalg.norm(tips[:, 1] - tips[:, 0], axis=1)
         return cls(ends, lengths, edges, partners, double_areas(edge_lengths(mesh.vertices, mesh.faces)))
+
+    def around(self, is_free: BoolArray, is_triangle: BoolArray) -> FlatEdges:
+        """Return the edges with free points (n,) and their partners; is_triangle: (m,) the triangles to keep."""
+        has_free: BoolArray = has_any(is_free, self.ends)
+        partners = self.partners[has_any(has_free, self.partners)]
+        chosen = has_free | mask_of(len(has_free), partners)
+        number = np.cumsum(chosen) - 1
+        return FlatEdges(
+            self.ends[chosen],
+            self.lengths[chosen],
+            self.edges[chosen],
+            number[partners],
+            self.double_areas[is_triangle],
+        )
 
     def vectors(self, points: FloatArray) -> FloatArray:
         """Return (k, 2) the flat edges as vectors."""
@@ -122,7 +136,11 @@ def least_strain(
     Notes:
         Newton's method with the positive part of the Hessian. The bounds by direction are those at the start of a step.
     """
-    moving = np.flatnonzero(np.repeat(np.ones(len(points), dtype=bool) if is_free is None else is_free, 2))
+    if is_free is None:
+        is_free = np.ones(len(points), dtype=bool)
+    is_triangle = has_any(is_free, corners)
+    edges, corners = edges.around(is_free, is_triangle), corners[is_triangle]
+    moving = np.flatnonzero(np.repeat(is_free, 2))
     factor: Factor | None = None
     matrix: csc_matrix | None = None
     for exponent in exponents:
