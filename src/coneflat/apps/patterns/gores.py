@@ -14,7 +14,7 @@ from ...mesh import tie_key
 from .cut_surface import CutSurface
 from .development import Development
 from .half_planes import AroundAxis
-from .relaxation import relaxed
+from .relaxing import least_strained
 
 # Digits of radii and keys by which the vertex of the first half-plane is chosen: rounding errors are smaller.
 DIGITS = 7
@@ -28,7 +28,7 @@ def cut_gores(mesh: TriangleMesh, count: int, axis: FloatArray) -> Development:
 
     The axis goes through the centre of area. A half-plane goes through the vertex that is farthest from it. Triangles
     are divided where half-planes cross them. Strips have the least strain that was found, and both sides of every seam
-    are equally long; they stand upright.
+    are equally long; they stand along it.
 
     Args:
         mesh: a connected surface: a body of revolution or a similar one, closed or open.
@@ -44,7 +44,7 @@ def cut_gores(mesh: TriangleMesh, count: int, axis: FloatArray) -> Development:
     closed = CutSurface(strips.mesh, strips.mesh.faces, np.zeros((len(strips.mesh.vertices), 2)))
     flat = closed.cut_along(np.flatnonzero(is_seam))
     _check_strips(flat, strips)
-    flat = relaxed(_laid_out(flat))
+    flat = least_strained(_laid_out(flat))
     return Development(replace(flat, points=_upright(flat, strips)))
 
 

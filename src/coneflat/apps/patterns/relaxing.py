@@ -11,10 +11,14 @@ import numpy as np
 from ...base import BoolArray, FloatArray
 from ...errors import MetricError
 from .cut_surface import CutSurface
-from .strain import Stretch, least_strain, relative_strains, with_equal_sides
+from .strain import EXPONENTS, Stretch, least_strain, relative_strains, with_equal_sides
 
 #: Exponents of the strain: of layouts in which it is moderately even, and then for the smallest largest one.
 EVEN, SMALLEST = (2, 4), (8, 16, 32)
+# The strain for which layouts without a bound are made even first; then its largest value is minimised.
+FIRST_STRAIN = 0.05
+# Strain below which a layout counts as exact: it is not changed.
+EXACT = 1e-7
 # Excess of the relative strain that is left to rounding.
 ROUNDING = 1e-9
 # The strain that layouts aim at, relative to the bound: making the sides of seams equally long adds a little.
@@ -28,6 +32,21 @@ def relaxed(
     aim = Stretch(AIM * stretch.warp, AIM * stretch.weft)
     points = least_strain(surface.edges, surface.corners, surface.points, aim, tuple(exponents), is_free)
     return replace(surface, points=points)
+
+
+def least_strained(surface: CutSurface) -> CutSurface:
+    """Return a cut surface with a small largest strain, the same in all directions, and equal sides of seams."""
+    if _largest_strain(surface) <= EXACT:
+        return surface
+    surface = relaxed(surface, Stretch(FIRST_STRAIN, FIRST_STRAIN), EVEN)
+    strain = _largest_strain(surface)
+    if strain > EXACT:
+        surface = relaxed(surface, Stretch(strain, strain), EXPONENTS)
+    return closed_seams(surface)
+
+
+def _largest_strain(surface: CutSurface) -> float:
+    return float(np.abs(surface.edges.strains(surface.points)).max())
 
 
 def closed_seams(surface: CutSurface) -> CutSurface:

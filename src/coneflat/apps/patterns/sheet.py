@@ -11,7 +11,7 @@ from ...geometry import angle_defect, corner_angles, edge_lengths
 from ...seams import find_seams
 from .cut_surface import CutSurface
 from .development import Development
-from .relaxation import relaxed
+from .relaxing import least_strained
 from .separation import without_overlaps
 from .thickness import thickness_of
 
@@ -45,7 +45,7 @@ def develop_sheet(mesh: TriangleMesh) -> Development:
         seams.append(vertices[component.edges[_cuts(component)]])
     with inner_calls():
         result = unwrap(mesh.vertices, mesh.faces, seams=("none", np.concatenate(seams)), charts="one")
-    return Development(without_overlaps(relaxed(CutSurface.of(result))))
+    return Development(without_overlaps(least_strained(CutSurface.of(result))))
 
 
 def _cuts(mesh: TriangleMesh) -> IntArray:
