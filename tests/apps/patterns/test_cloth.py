@@ -158,10 +158,11 @@ def test_smooth_seams_stay_near_the_surface():
 
 def test_dense_meshes_are_simplified_within_the_tolerance():
     mesh = TriangleMesh(*shapes.sphere(5))
-    coarse, distance = simplified(mesh, 0.01)
+    coarse, distances = simplified(mesh, 0.01)
     assert len(coarse.faces) < len(mesh.faces) / 2
-    assert 0 < distance <= 0.01
-    assert simplified(mesh, 1e-9) == (mesh, 0.0)
+    assert 0 < distances.mean() <= 0.01
+    assert distances.max() >= surface_distances(coarse.vertices, coarse.faces, mesh.vertices).max()
+    assert simplified(mesh, 1e-9)[0] is mesh
 
 
 def test_every_border_half_edge_is_on_one_side(ball):

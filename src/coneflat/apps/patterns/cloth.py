@@ -52,11 +52,11 @@ def cloth_pieces(model: Model, options: PatternOptions) -> Development:
     stretch = Stretch(warp, weft)
     mesh, notes = model.mesh, list[str]()
     if model.seams is None:
-        mesh, distance = simplified(model.mesh, options.tolerance)
+        mesh, distances = simplified(model.mesh, options.tolerance)
         if mesh is not model.mesh:
             notes.append(
                 f"The pattern is that of a mesh with {len(mesh.faces):,} instead of {len(model.mesh.faces):,} "
-                f"triangles, at most {distance:.2g} mm from it."
+                f"triangles, {distances.mean():.2g} mm from it on average and {distances.max():.2g} mm at most."
             )
     surface = cut_cloth(replace(model, mesh=mesh), stretch)
     with part_of_work(SMOOTHING_SHARE, "smooth seams"):

@@ -32,8 +32,8 @@ class PatternOptions(RunOptions):
         stretch_weft: The same across the grain only.
         darts: auto: cuts that end inside a piece become darts. none: they go on to another border.
         seams: Edges that must be cut, as pairs of vertices; or input, for the seams of the UVs in the file.
-        tolerance: Largest distance from the model up to which seams of cloth are made smooth, and dense meshes
-            simplified.
+        tolerance: Largest distance from the surface at which seams of cloth are made smooth, and mean distance at which
+            dense meshes are simplified; 0 for neither.
         gores: Number of strips from pole to pole.
         axis: Direction from pole to pole, and of the grain; by default the upward direction of the model.
         allowance: Width of the seam allowance: 7 mm for cloth and gores by default, else 0.

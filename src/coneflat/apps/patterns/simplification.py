@@ -10,24 +10,29 @@ from ...geometry import coarse_mesh, surface_distances
 
 # Numbers of triangles of a simplified mesh that are tried; one with fewer than LEAST_TRIANGLES is left as it is.
 COUNTS, LEAST_TRIANGLES = (6_000, 12_000, 24_000), 10_000
+# Largest distance of a simplified mesh, relative to the diagonal of the box around the model.
+MAX_DISTANCE = 0.01
 
 
-def simplified(mesh: TriangleMesh, tolerance: float) -> tuple[TriangleMesh, float]:
-    """Return a mesh with fewer triangles if it has many, and the largest distance between both surfaces.
+def simplified(mesh: TriangleMesh, tolerance: float) -> tuple[TriangleMesh, FloatArray]:
+    """Return a mesh with fewer triangles if it has many, and the distances between both surfaces.
+
+    The distances are measured at the vertices and at the middles of the edges of both.
 
     Args:
         mesh: the mesh.
-        tolerance: largest distance allowed, measured at the vertices and at the middles of the edges of both; 0 for no
-            change. If the smallest number of triangles within it is no less than half of those of the mesh, it remains.
+        tolerance: largest mean distance allowed; 0 for no change. If the smallest number of triangles within it is no
+            less than half of those of the mesh, it remains.
     """
     for count in COUNTS:
         if tolerance == 0 or len(mesh.faces) < max(LEAST_TRIANGLES, 2 * count):
             break
         coarse = _simplified_parts(mesh, count)
-        distance = _largest_distance(mesh, coarse)
-        if distance <= tolerance:
-            return coarse, distance
-    return mesh, 0.0
+        distances = _distances(mesh, coarse)
+        is_near = distances.max() <= MAX_DISTANCE * np.linalg.norm(np.ptp(mesh.vertices, axis=0))
+        if is_near and distances.mean() <= tolerance:
+            return coarse, distances
+    return mesh, np.zeros(1)
 
 
 def _simplified_parts(mesh: TriangleMesh, count: int) -> TriangleMesh:
@@ -42,12 +47,13 @@ def _simplified_parts(mesh: TriangleMesh, count: int) -> TriangleMesh:
     return TriangleMesh(np.concatenate(vertices), np.concatenate(faces))
 
 
-def _largest_distance(first: TriangleMesh, second: TriangleMesh) -> float:
-    """Return the largest distance of the vertices and middles of edges of each mesh from the other one."""
-    return max(
-        float(surface_distances(goal.vertices, goal.faces, _samples(mesh)).max())
+def _distances(first: TriangleMesh, second: TriangleMesh) -> FloatArray:
+    """Return the distances of the vertices and middles of edges of each mesh from the other one."""
+    parts = [
+        surface_distances(goal.vertices, goal.faces, _samples(mesh))
         for mesh, goal in ((first, second), (second, first))
-    )
+    ]
+    return np.concatenate(parts)
 
 
 def _samples(mesh: TriangleMesh) -> FloatArray:
