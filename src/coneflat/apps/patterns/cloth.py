@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from ... import TriangleMesh, unwrap
-from ...base import BoolArray, FloatArray, IntArray, Unmet, has_any, mask_of, part_of_work, plural
+from ...base import BoolArray, FloatArray, IntArray, Unmet, begin_step, has_any, mask_of, part_of_work, plural
 from ...geometry import angle_defect, corner_angles, edge_lengths
 from ...linalg import MultiGraph
 from ...mesh import label_components, nearby
@@ -93,7 +93,7 @@ def cut_cloth(model: Model, stretch: Stretch) -> CutSurface:
     shortest: CutSurface | None = None
     smallest: CutSurface | None = None
     for number in range(TEXTURES):
-        with part_of_work(TEXTURE_SHARE, f"cut {number + 1}"):
+        with part_of_work(TEXTURE_SHARE, f"attempt {number + 1}"):
             texture = unwrap(
                 mesh.vertices,
                 mesh.faces,
@@ -168,6 +168,7 @@ def slit_until_within(surface: CutSurface, stretch: Stretch) -> CutSurface:
     even = relaxed(surface, stretch, EVEN)
     flat = relaxed(even, stretch, SMALLEST)
     for _ in range(ROUNDS):
+        begin_step()
         separated = without_overlaps(flat)
         if separated is not flat:
             even = even.cut_along(separated.seams, separated.places)

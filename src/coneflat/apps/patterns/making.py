@@ -8,7 +8,7 @@ from typing import Any
 
 from numpy.typing import ArrayLike
 
-from ...base import stage, timing, warns
+from ...base import component_at_work, timing, warns
 from ...options import read_options, settings, takes
 from .cloth import cloth_pieces
 from .development import Development
@@ -21,6 +21,9 @@ from .result import Pattern
 from .shapes import Tab
 from .sheet import develop_sheet
 from .tabs import glue_tabs
+
+# Fractions of the work that are done after checking the mesh and after cutting it.
+CHECKED, CUT = 0.02, 0.95
 
 
 @takes(PatternOptions)
@@ -50,12 +53,12 @@ def pattern(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Patter
         (True, 'cloth')
     """
     parsed = read_options(options, PatternOptions)
-    with timing(parsed.progress):
-        with stage("check"):
+    with timing(parsed.progress) as stages, component_at_work("", 1.0):
+        with stages("check", CHECKED):
             model = read_model(mesh, faces, parsed)
-        with stage("cut"):
+        with stages("cut", CUT):
             developed = _METHODS[parsed.kind](model, parsed)
-        with stage("pack"):
+        with stages("pack", 1.0):
             return _placed(model, developed, parsed)
 
 

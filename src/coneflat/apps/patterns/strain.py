@@ -8,7 +8,7 @@ import numpy as np
 from scipy.sparse import csc_matrix, csr_matrix, diags, eye
 
 from ... import TriangleMesh
-from ...base import BoolArray, FloatArray, IntArray, has_any, mask_of
+from ...base import BoolArray, FloatArray, IntArray, check_cancelled, has_any, mask_of
 from ...errors import MetricError
 from ...geometry import double_areas, edge_lengths, signed_double_areas
 from ...linalg import Factor, factorize
@@ -141,11 +141,14 @@ def least_strain(
     is_triangle = has_any(is_free, corners)
     edges, corners = edges.around(is_free, is_triangle), corners[is_triangle]
     moving = np.flatnonzero(np.repeat(is_free, 2))
+    if not len(moving):
+        return points
     factor: Factor | None = None
     matrix: csc_matrix | None = None
     for exponent in exponents:
         model = _PowerSum(edges, corners, stretch, exponent)
         for _ in range(STEPS):
+            check_cancelled()
             bounds = stretch.bounds(edges.vectors(points))
             before = model.value(points, bounds)
             gradient, hessian = model.derivatives(points, bounds)
