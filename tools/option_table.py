@@ -7,6 +7,10 @@ from collections.abc import Callable
 
 from coneflat.apps.cli.flags import flag_name, shown_default
 from coneflat.apps.cli.main import cli
+from coneflat.apps.patterns import PatternOptions
+from coneflat.apps.patterns.finish import Allowances
+from coneflat.apps.patterns.papers import PaperName
+from coneflat.apps.patterns.units import Length, Percentage
 from coneflat.options import declarations, kinds
 from coneflat.options.declared import (
     AtlasOptions,
@@ -18,6 +22,13 @@ from coneflat.options.declared import (
 )
 from coneflat.quadmesh import QuadOptions
 
+#: Values of options of patterns, as flags and as keywords.
+PATTERN_VALUES = {
+    Length: ("`7mm`, `0.7cm`, `0.25in`", 'millimetres, or a text such as `"7mm"`'),
+    Percentage: ("`3%`, `0.03`", 'a fraction, or a text such as `"3%"`'),
+    PaperName: ("`A4`, `letter`, `roll:900mm`, `none`", '`"A4"`, `"letter"`, `"roll:900mm"`, `"none"`'),
+    Allowances: ("`A=10mm,hem=0`", '`"A=10mm,hem=0"`'),
+}
 #: As people think of them; each group's docstring is its title.
 GROUPS = (ConeOptions, MetricOptions, SeamOptions, AtlasOptions, RunOptions)
 
@@ -40,6 +51,16 @@ def quad_flag_table() -> str:
 def quad_keyword_table() -> str:
     """Return the keywords of `coneflat.quads`."""
     return _keyword_table(QuadOptions)
+
+
+def pattern_flag_table() -> str:
+    """Return the options of `coneflat pattern`."""
+    return _flag_table(PatternOptions, "pattern")
+
+
+def pattern_keyword_table() -> str:
+    """Return the keywords of `coneflat.pattern`."""
+    return _keyword_table(PatternOptions)
 
 
 def _flag_table(group: type, command: str = "flatten") -> str:
@@ -139,6 +160,8 @@ def _values(kind: kinds.Kind) -> str:
             return " or ".join([*_words(kind), "a file of pairs"])
         case kinds.Weights():
             return "a name or a file"
+        case Length() | Percentage() | PaperName() | Allowances():
+            return PATTERN_VALUES[type(kind)][0]
     return ""
 
 
@@ -175,6 +198,8 @@ def _python_values(kind: kinds.Kind) -> str:
             return kind.text
         case kinds.Weights():
             return "(n,) numbers, a map from vertex to number, or the name of a property"
+        case Length() | Percentage() | PaperName() | Allowances():
+            return PATTERN_VALUES[type(kind)][1]
     return "a function"
 
 

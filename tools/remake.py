@@ -22,15 +22,27 @@ MODELS = ROOT.parent / "shared" / "meshes"
 def remake_options(_: argparse.Namespace | None = None) -> Iterator[tuple[Path, str]]:
     """Yield the pages with tables of options and the list of measures."""
     from measure_list import measure_list
-    from option_table import flag_tables, keyword_tables, quad_flag_table, quad_keyword_table
+    from option_table import (
+        flag_tables,
+        keyword_tables,
+        pattern_flag_table,
+        pattern_keyword_table,
+        quad_flag_table,
+        quad_keyword_table,
+    )
 
     tables = {
         "reference/command-line.md": {
             "options": flag_tables,
             "quad options": quad_flag_table,
+            "pattern options": pattern_flag_table,
             "measures": measure_list,
         },
-        "reference/python.md": {"keywords": keyword_tables, "quad keywords": quad_keyword_table},
+        "reference/python.md": {
+            "keywords": keyword_tables,
+            "quad keywords": quad_keyword_table,
+            "pattern keywords": pattern_keyword_table,
+        },
     }
     for page, by_name in tables.items():
         text = (DOCS / page).read_text(encoding="utf-8")

@@ -24,7 +24,7 @@ PLATFORMS = (
 )  # fmt: skip
 PYTHONS = ("3.10", "3.14")
 #: Extras that users install; those for developers may lack wheels somewhere.
-EXTRAS = ("brains", "dask", "docs", "fast", "figures", "formats", "studio")
+EXTRAS = ("brains", "dask", "docs", "fast", "figures", "formats", "patterns", "studio")
 DEVELOPERS_EXTRAS = ("bench", "blender-test", "dev")
 TIME_LIMIT = 300  # seconds of one resolution
 CONNECTIONS = 4  # resolutions at once, which mostly wait for the registry

@@ -51,6 +51,8 @@ _HOMES = {
     "TriangleMesh": "mesh.connectivity",
     "measure": "measures.distortion",
     "measure_uv": "apps.uv_measures",
+    "pattern": "apps.patterns.making",
+    "Pattern": "apps.patterns.result",
     "quads": "quadmesh.quad_meshing",
     "repack": "repacking",
     "unwrap": "textures.unwrapping",
@@ -82,6 +84,7 @@ __all__ = [
     "IntegerGrid",
     "MeshFile",
     "PAPER",
+    "Pattern",
     "QuadMesh",
     "SeamData",
     "TriangleMesh",
@@ -96,6 +99,7 @@ __all__ = [
     "measure",
     "measure_quads",
     "measure_uv",
+    "pattern",
     "quads",
     "read_flattening",
     "read_mesh",
@@ -122,6 +126,7 @@ if TYPE_CHECKING:
         seams,
         stages,
     )
+    from .apps.patterns.result import Pattern
     from .apps.studio.notebook import studio
     from .apps.uv_measures import measure_uv
     from .apps.view import make_figure, save_figure

@@ -10,10 +10,12 @@ from functools import partial
 
 import numpy as np
 
-from .. import flatten, sample_path, unwrap
+from .. import TriangleMesh, flatten, sample_path, unwrap
 from ..base import FloatArray, IntArray, inner_calls
 from ..geometry import visible_share
 from ..quadmesh import measure_quads, quads
+from .patterns.net import unfold_net
+from .patterns.thickness import thickness_of
 
 
 def steps() -> Iterator[tuple[str, Callable[[], object]]]:
@@ -40,6 +42,9 @@ def steps() -> Iterator[tuple[str, Callable[[], object]]]:
     yield "quads", lambda: measure_quads(quads(*torus, quads=300))
     yield "short loops", partial(quads, *torus, quads=2000, loops=True)
     yield "visibility", partial(visible_share, *torus)
+    tower = TriangleMesh(*_tower())
+    yield "nets", partial(unfold_net, tower)
+    yield "thickness", partial(thickness_of, tower)
 
 
 def compile_kernels(report: Callable[[str, float], object] = lambda name, done: None) -> None:
@@ -66,6 +71,18 @@ def _tube(closed: bool, around: int = 40, across: int = 24) -> tuple[FloatArray,
     faces = np.concatenate([np.stack(corners[:3], 1), np.stack([corners[0], corners[2], corners[3]], 1)])
     vertices, faces = np.unique(faces, return_inverse=True)
     return points[vertices], faces.reshape(-1, 3)
+
+
+def _tower() -> tuple[FloatArray, IntArray]:
+    """Return a box on a larger box, whose net has two pieces, so that the search for nets needs all its kernels."""
+    ring = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+    levels = [(3.0, 0.0), (3.0, 2.0), (1.0, 2.0), (1.0, 4.0)]
+    points = np.concatenate([np.column_stack([size * ring, np.full(4, height)]) for size, height in levels])
+    first = np.arange(12)
+    second = first // 4 * 4 + (first + 1) % 4
+    walls = [np.stack([first, second, second + 4], 1), np.stack([first, second + 4, first + 4], 1)]
+    caps = np.array([[0, 2, 1], [0, 3, 2], [12, 13, 14], [12, 14, 15]])
+    return points, np.concatenate([caps, *walls])
 
 
 if __name__ == "__main__":

@@ -5,7 +5,7 @@ from .coverage import approximate_overlap_areas
 from .handles import handle_loops
 from .intrinsic import halfedge_twins
 from .layers import MAX_CELLS
-from .nearest import TriangleTree
+from .nearest import TriangleTree, surface_distances
 from .opening import mollify
 from .operators import angle_defect, cotangent_laplacian
 from .orientation import fill_orientations, orientation
@@ -39,6 +39,7 @@ from .triangles import (
     unit_vectors,
     vertex_normals,
 )
+from .upward import rotated_up
 from .visibility import fill_nearest, visible_share
 
 __all__ = [
@@ -47,7 +48,7 @@ __all__ = [
     "cotangents", "dihedral_angles", "double_areas", "edge_lengths", "face_normals", "fill_nearest",
     "fill_orientations", "find_overlaps", "flat_triangles", "handle_loops", "halfedge_twins", "is_broken",
     "approximate_overlap_areas", "layout_curvature", "map_factors", "mean_energy", "mollify", "orientation",
-    "qc_distortion", "quarters_around", "rest_sides", "rotated", "sides_between", "signed_angles",
-    "signed_double_areas", "triangle_energies", "turn", "unit_vectors", "vertex_log_scale", "vertex_normals",
-    "visible_share",
+    "qc_distortion", "quarters_around", "rest_sides", "rotated", "rotated_up", "sides_between", "signed_angles",
+    "signed_double_areas", "surface_distances", "triangle_energies", "turn", "unit_vectors",
+    "vertex_log_scale", "vertex_normals", "visible_share",
 ]  # fmt: skip

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, ParamSpec, Protocol, TypeVar, cast
 
 from ..errors import OptionError
 from .combined import Options
-from .declared import WIDEST_CONE, declarations
+from .declared import WIDEST_CONE, InputOptions, declarations
 from .kinds import Edges, VerticesOrEdges, Weights
 
 if TYPE_CHECKING:
@@ -52,7 +52,7 @@ def read_options(values: Mapping[str, Any], group: type[G] = Options) -> G:  # t
     return group(**parsed)
 
 
-def settings(options: Options) -> dict[str, Any]:
+def settings(options: InputOptions) -> dict[str, Any]:
     """Return options as plain Python values, for a report."""
     values: dict[str, Any] = {}
     for name, declaration in declarations(cast(type, type(options))).items():

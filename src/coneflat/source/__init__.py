@@ -6,12 +6,13 @@ from .congruent import Congruence, congruence
 from .constraints import vertex_numbers
 from .copies import find_copies, has_vertex_options
 from .fill import Fill
-from .input_mesh import at_unit_size, result_numbering
+from .input_mesh import InputMesh, at_unit_size, result_numbering
+from .marked_edges import marked_edges
 from .preparation import LatestCache, Source
 from .rounding import rounding_notes
 
 __all__ = [
-    "Component", "Congruence", "Fill", "LatestCache", "Prepared", "Source", "at_unit_size", "coarse_component",
-    "congruence", "find_copies", "has_vertex_options", "is_large", "result_numbering", "rounding_notes",
-    "vertex_numbers",
+    "Component", "Congruence", "Fill", "InputMesh", "LatestCache", "Prepared", "Source", "at_unit_size",
+    "coarse_component", "congruence", "find_copies", "has_vertex_options", "is_large", "marked_edges",
+    "result_numbering", "rounding_notes", "vertex_numbers",
 ]  # fmt: skip

@@ -13,7 +13,7 @@ import numpy as np
 from ... import Flattening, MeshFile, check_mesh, flatten
 from ...base import BoolArray, FloatArray, IntArray, mask_of, plural, warns
 from ...errors import OptionError
-from ...geometry import signed_double_areas
+from ...geometry import rotated_up, signed_double_areas
 from ...io import UVMesh, as_path, checked_target, read_label, read_mesh
 from ...mesh import label_faces
 from .files import FLAT_FORMATS, check_same_side, structure_of, write_gifti, write_patch
@@ -143,24 +143,3 @@ def _as_flat(result: Flattening, surface: MeshFile, up: FloatArray) -> FlatCorte
         points[is_laid_out], surface.vertices[is_laid_out], up, area[chosen[is_laid_out]]
     )
     return FlatCortex(result, surface, points, faces, np.bincount(vertex, minlength=count) == 1)
-
-
-def rotated_up(flat: FloatArray, positions: FloatArray, up: FloatArray, weights: FloatArray) -> FloatArray:
-    """Return the points of a flat map (n, 2) about their mean, rotated so that a direction of the surface points up.
-
-    The direction is mapped by the affine map from the positions to the plane that fits the points best.
-
-    Args:
-        flat: (n, 2) points.
-        positions: (n, 3) their positions on the surface.
-        up: (3,) direction.
-        weights: (n,) areas around the points.
-    """
-    share = weights / weights.sum()
-    flat, placed = flat - flat.mean(axis=0), positions - share @ positions
-    roots = np.sqrt(share)[:, None]
-    affine = np.linalg.lstsq(roots * placed, roots * (flat - share @ flat), rcond=None)[0]
-    x, y = up @ affine
-    length = float(np.hypot(x, y))
-    # On a surface that is flat and seen along the direction, no direction in the plane is up.
-    return flat @ np.array([[y, x], [-x, y]]) / length if length > 0 else flat

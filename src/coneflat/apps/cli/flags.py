@@ -65,7 +65,7 @@ class ExitCode(IntEnum):
 BRIEF = (*RARE, "distortion", "cone_count", "stretch", "seams", "sharp_angle", "resolution", "up")
 RARE_TITLE = "Less common options (all details: docs/reference/command-line.md)"
 #: Titles of groups of options in the help.
-GROUPS = ("Texture", "Quads", "Cones", "Metric", "Seams", "Atlas", "Input", "Output", RARE_TITLE)
+GROUPS = ("Texture", "Quads", "Pattern", "Cones", "Metric", "Seams", "Atlas", "Input", "Output", RARE_TITLE)
 
 
 class Grouped(click.Option):

@@ -26,6 +26,7 @@ from .figure_commands import demo, figure
 from .flags import ExitCode
 from .flatten_commands import flatten, unwrap
 from .measure_command import measure
+from .pattern_command import pattern
 from .quads_command import quads
 from .transfer_command import transfer
 from .view_commands import studio, view
@@ -70,7 +71,7 @@ def cli(context: click.Context) -> None:
 
 
 for command in (
-    flatten, unwrap, transfer, batch, brain, quads, measure, cones, figure, view, studio, blender, demo,
+    flatten, unwrap, transfer, batch, brain, quads, pattern, measure, cones, figure, view, studio, blender, demo,
     warm_up,
 ):  # fmt: skip
     cli.add_command(command)

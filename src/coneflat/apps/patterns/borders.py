@@ -1,0 +1,193 @@
+"""Borders of pieces, divided into the sides of seams, and sides that are sewn to nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from ... import TriangleMesh
+from ...base import FloatArray, IntArray
+from .cut_surface import CutSurface
+
+#: Difference of the lengths of the sides of a seam that can be neglected, mm.
+NEGLIGIBLE = 0.01
+
+
+@dataclass(frozen=True, eq=False)
+class Side:
+    """A part of the border of a piece: k half-edges, counterclockwise around the piece.
+
+    Attributes:
+        piece: the piece.
+        points: (k + 1,) its points. The first and the last are the same one if it is a whole border.
+        halfedges: (k,) its half-edges, 3 times the triangle plus the corner opposite, as in the mesh.
+    """
+
+    piece: int
+    points: IntArray
+    halfedges: IntArray
+
+
+@dataclass(frozen=True, eq=False)
+class Seam:
+    """Two sides that are sewn together.
+
+    Attributes:
+        name: A, B, ..., Z, AA, ...
+        sides: the two sides; edge i of the first is sewn to the edge i from the end of the second.
+        lengths: the lengths of both sides in the plane, mm.
+        surface_length: their length on the surface, mm.
+        largest_gap: largest difference of the distances of matching points along both sides, mm.
+    """
+
+    name: str
+    sides: tuple[Side, Side]
+    lengths: tuple[float, float]
+    surface_length: float
+    largest_gap: float
+
+    @property
+    def ease(self) -> float:
+        """The difference of the lengths of the sides, mm."""
+        return abs(self.lengths[0] - self.lengths[1])
+
+    @property
+    def is_eased(self) -> bool:
+        """Whether the sides differ in length by more than can be neglected."""
+        return self.ease > NEGLIGIBLE
+
+    @property
+    def is_dart(self) -> bool:
+        """Whether the sides meet at an end, the tip of a dart."""
+        return self.tip is not None
+
+    @cached_property
+    def tip(self) -> int | None:
+        """The point at the tip of a dart; None if the seam is no dart."""
+        first, second = self.sides
+        for end in (-1, 0):
+            if first.points[end] == second.points[-1 - end]:
+                return int(first.points[end])
+        return None
+
+
+@dataclass(frozen=True, eq=False)
+class Borders:
+    """The borders of all pieces.
+
+    Attributes:
+        loops: of each piece, the half-edges of its borders, the outer one first.
+        seams: the seams, by name.
+        hems: the sides that are sewn to nothing.
+    """
+
+    loops: tuple[tuple[IntArray, ...], ...]
+    seams: tuple[Seam, ...]
+    hems: tuple[Side, ...]
+
+
+def find_borders(surface: CutSurface) -> Borders:
+    """Return the borders of the pieces of a cut surface."""
+    pieces = TriangleMesh(np.zeros((len(surface.points), 3)), surface.corners)
+    walks = pieces.boundary_walks()
+    of_piece: list[list[IntArray]] = [[] for _ in range(int(surface.pieces.max()) + 1)]
+    for walk in walks:
+        of_piece[int(surface.pieces[walk[0] // 3])].append(walk)
+    loops = tuple(tuple(sorted(walks, key=lambda walk: -_area(pieces, surface, walk))) for walks in of_piece)
+    twins = _twins(surface.mesh)
+    following = np.full(3 * len(surface.corners), -1)
+    for walk in walks:
+        following[walk] = np.roll(walk, -1)
+    sides = [
+        side
+        for walks_of_piece in loops
+        for walk in walks_of_piece
+        for side in _sides(pieces, surface, _started(walk, twins, following), twins, following)
+    ]
+    return Borders(loops, tuple(_seams(surface, sides, twins)), tuple(_hems(sides, twins)))
+
+
+def _twins(mesh: TriangleMesh) -> IntArray:
+    """Return (3m,) the half-edge on the other side of each half-edge, -1 on the border of the mesh."""
+    twins = np.full(3 * len(mesh.faces), -1)
+    first, second = mesh.edge_halfedges[~mesh.is_boundary_edge].T
+    twins[first], twins[second] = second, first
+    return twins
+
+
+def _area(pieces: TriangleMesh, surface: CutSurface, walk: IntArray) -> float:
+    """Return the area inside a border, negative around holes."""
+    x, y = surface.points[pieces.tails[walk]].T
+    return float(x @ np.roll(y, -1) - y @ np.roll(x, -1)) / 2
+
+
+def _breaks(walk: IntArray, twins: IntArray, following: IntArray) -> IntArray:
+    """Return the positions in a border at which a side begins."""
+    before, after = twins[np.roll(walk, 1)], twins[walk]
+    is_hem = (before < 0) & (after < 0)
+    goes_on = (before >= 0) & (after >= 0) & (following[after] == before) & (before != walk)
+    return np.flatnonzero(~(is_hem | goes_on))
+
+
+def _started(walk: IntArray, twins: IntArray, following: IntArray) -> IntArray:
+    """Return a border that starts where a side begins.
+
+    A border without such a place starts with its smallest half-edge, or opposite where its partner starts.
+    """
+    breaks = _breaks(walk, twins, following)
+    if len(breaks):
+        return np.roll(walk, -breaks[0])
+    partners = twins[walk]
+    is_first = partners[0] < 0 or walk.min() < partners.min()
+    return np.roll(walk, -int(walk.argmin() if is_first else (partners.argmin() + 1) % len(walk)))
+
+
+def _sides(
+    pieces: TriangleMesh, surface: CutSurface, walk: IntArray, twins: IntArray, following: IntArray
+) -> Iterator[Side]:
+    starts = _breaks(walk, twins, following)
+    for part in np.split(walk, starts[starts > 0]):
+        points = np.append(pieces.tails[part], pieces.heads[part[-1]])
+        yield Side(int(surface.pieces[part[0] // 3]), points, part)
+
+
+def _seams(surface: CutSurface, sides: Sequence[Side], twins: IntArray) -> Iterator[Seam]:
+    by_first = {int(side.halfedges[0]): side for side in sides}
+    number = 0
+    for side in sides:
+        last = int(twins[side.halfedges[-1]])
+        if last < 0 or last not in by_first:
+            continue
+        partner = by_first[last]
+        if side.halfedges.min() < partner.halfedges.min():
+            yield _seam(surface, letters(number), side, partner)
+            number += 1
+
+
+def _hems(sides: Sequence[Side], twins: IntArray) -> Iterator[Side]:
+    return (side for side in sides if twins[side.halfedges[0]] < 0)
+
+
+def _seam(surface: CutSurface, name: str, first: Side, second: Side) -> Seam:
+    along = [_distances(surface.points[side.points]) for side in (first, second)]
+    matching = along[1][-1] - along[1][::-1]
+    on_surface = surface.edge_lengths[surface.mesh.halfedge_edges[first.halfedges]].sum()
+    gap = float(np.abs(along[0] - matching).max())
+    return Seam(name, (first, second), (float(along[0][-1]), float(along[1][-1])), float(on_surface), gap)
+
+
+def _distances(places: FloatArray) -> FloatArray:
+    """Return (k,) the distance of each of k points along the polyline through them."""
+    return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(places, axis=0), axis=1))])
+
+
+def letters(number: int) -> str:
+    """Return A, B, ..., Z, AA, AB, ... for a number from 0."""
+    name = ""
+    while number >= 0:
+        number, digit = divmod(number, 26)
+        name, number = chr(ord("A") + digit) + name, number - 1
+    return name

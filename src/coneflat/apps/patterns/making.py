@@ -1,0 +1,104 @@
+"""Patterns of meshes: `pattern` is the method, top to bottom."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import Any
+
+from numpy.typing import ArrayLike
+
+from ...base import component_at_work, timing, warns
+from ...options import read_options, settings, takes
+from .cloth import cloth_pieces
+from .development import Development
+from .gores import cut_gores
+from .model import Model, read_model
+from .nesting import nested
+from .net import unfold_net
+from .options import PatternOptions
+from .result import Pattern
+from .shapes import Tab
+from .sheet import develop_sheet
+from .tabs import glue_tabs
+
+# Fractions of the work that are done after checking the mesh and after cutting it.
+CHECKED, CUT = 0.02, 0.95
+
+
+@takes(PatternOptions)
+@warns()
+def pattern(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Pattern:
+    """Return the pattern of a surface: pieces in the plane, in millimetres, and how they are joined.
+
+    Cones of the flattening are the tips of darts. Both sides of a seam are equally long.
+
+    Args:
+        mesh, faces: as for `coneflat.flatten`.
+        options: see below. Lengths are numbers in millimetres, or texts with a unit such as "7mm" or "0.25in".
+
+    Returns:
+        The pattern. `save` writes it as PDF, SVG or DXF.
+
+    Raises:
+        OptionError: the model has no unit and no height is given, or an option is unknown or invalid.
+        MeshError, MeshFileError, SeamError, MetricError, TooLargeError: as for `coneflat.unwrap`.
+
+    Warns:
+        GuaranteeWarning: a guarantee, or a request, is not met; notes of the result say which.
+
+    Examples:
+        >>> result = coneflat.pattern(coneflat.sample_path(), height="200mm", strain="5%")
+        >>> abs(result.strains).max() <= 0.05, result.kind
+        (True, 'cloth')
+    """
+    parsed = read_options(options, PatternOptions)
+    with timing(parsed.progress) as stages, component_at_work("", 1.0):
+        with stages("check", CHECKED):
+            model = read_model(mesh, faces, parsed)
+        with stages("cut", CUT):
+            developed = _METHODS[parsed.kind](model, parsed)
+        with stages("pack", 1.0):
+            return _placed(model, developed, parsed)
+
+
+def _cloth(model: Model, options: PatternOptions) -> Development:
+    return cloth_pieces(model, options)
+
+
+def _net(model: Model, options: PatternOptions) -> Development:
+    return unfold_net(model.mesh)
+
+
+def _gores(model: Model, options: PatternOptions) -> Development:
+    return cut_gores(model.mesh, options.gores, model.axis)
+
+
+def _sheet(model: Model, options: PatternOptions) -> Development:
+    return develop_sheet(model.mesh)
+
+
+_METHODS: Mapping[str, Callable[[Model, PatternOptions], Development]] = {
+    "cloth": _cloth,
+    "net": _net,
+    "gores": _gores,
+    "sheet": _sheet,
+}
+
+
+def _placed(model: Model, developed: Development, options: PatternOptions) -> Pattern:
+    """Return the pattern of developed pieces, with glue tabs, placed side by side."""
+    result = Pattern(
+        kind=options.kind,
+        surface=developed.surface,
+        millimetres=model.millimetres,
+        folds=developed.folds,
+        fold_angles=developed.fold_angles,
+        notes=(*model.notes, *developed.notes),
+        settings={**settings(options), "axis": tuple(model.axis.tolist())},
+    )
+    if options.kind == "net" and options.tabs > 0:
+        glued = glue_tabs(developed.surface, result.borders, options.tabs)
+        tabs = tuple(Tab(tab.polygon, tab.piece) for tab in glued.tabs)
+        result = replace(result, tabs=tabs, notes=(*result.notes, *glued.notes))
+    return nested(result)

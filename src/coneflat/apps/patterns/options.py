@@ -1,0 +1,71 @@
+"""Options of patterns."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from ...errors import OptionError
+from ...options import Choice, Direction, Edges, Number, RunOptions, option
+from .finish import Allowances
+from .papers import PaperName
+from .units import MILLIMETRES, Length, Percentage
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+KINDS = ("cloth", "net", "gores", "sheet")
+
+
+@dataclass(frozen=True, kw_only=True)
+class PatternOptions(RunOptions):
+    """Pattern.
+
+    Attributes:
+        kind: cloth: the shortest seams for a strain. net: an exact unfolding of a polyhedron, with folds and glue tabs.
+            gores: strips from pole to pole. sheet: one piece, with bend lines.
+        unit: Unit of the coordinates of the model.
+        scale: Factor of its size.
+        height: Height of the finished object, instead of unit and scale.
+        strain: Largest relative change of the length of any edge of cloth.
+        stretch_warp: The same along the grain only, for cloth that stretches differently.
+        stretch_weft: The same across the grain only.
+        darts: auto: cuts that end inside a piece become darts. none: they go on to another border.
+        seams: Edges that must be cut, as pairs of vertices; or input, for the seams of the UVs in the file.
+        tolerance: Largest distance from the surface at which seams of cloth are made smooth, and mean distance at which
+            dense meshes are simplified; 0 for neither.
+        gores: Number of strips from pole to pole.
+        axis: Direction from pole to pole, and of the grain; by default the upward direction of the model.
+        allowance: Width of the seam allowance: 7 mm for cloth and gores by default, else 0.
+        seam_allowances: Widths of single seams by name, such as A=10mm,B=0.
+        corners: Corners of the allowance: mitred or round.
+        tabs: Width of the glue tabs of a net; 0 for none.
+        page: Paper of a PDF: a page size, onto which the pattern is tiled; roll:WIDTH; or none for one page as large as
+            the pattern.
+    """
+
+    kind: str = option("cloth", Choice(KINDS))
+    unit: str | None = option(None, Choice((*MILLIMETRES,)))
+    scale: float = option(1.0, Number(is_positive=True))
+    height: float | None = option(None, Length(optional=True, is_positive=True))
+    strain: float = option(0.03, Percentage())
+    stretch_warp: float | None = option(None, Percentage(optional=True))
+    stretch_weft: float | None = option(None, Percentage(optional=True))
+    darts: str = option("auto", Choice(("auto", "none")))
+    seams: ArrayLike | str | None = option(None, Edges(("input",)), one_mesh=True)
+    tolerance: float = option(0.5, Length())
+    gores: int = option(12, Number(2, 1000, is_integer=True))
+    axis: tuple[float, float, float] | None = option(None, Direction())
+    allowance: float | None = option(None, Length(optional=True))
+    seam_allowances: str = option("", Allowances())
+    corners: str = option("mitred", Choice(("mitred", "round")))
+    tabs: float = option(8.0, Length())
+    page: str = option("A4", PaperName())
+
+    def __post_init__(self) -> None:
+        if self.height is not None and (self.unit is not None or self.scale != 1.0):
+            raise OptionError("height and unit or scale cannot be combined: leave out one of them")
+        if self.seams is not None and self.kind != "cloth":
+            raise OptionError(f"seams and kind {self.kind} cannot be combined: only cloth takes seams")
+        if self.lengths is not None:
+            raise OptionError("lengths and patterns cannot be combined: leave out lengths")

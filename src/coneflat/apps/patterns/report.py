@@ -1,0 +1,79 @@
+"""What is measured of a pattern."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from .allowances import shapely
+from .finish import Finish
+from .papers import EDGE, Paper
+from .result import Pattern
+from .shapes import piece_shapes
+from .tiling import tiles_of
+
+#: Numbers of the report, which `--require` takes.
+PATTERN_MEASURES = (
+    "pieces", "seams", "darts", "eased_seams", "ease_max", "seam_length", "strain_max", "strain_mean", "area",
+    "sheet_width", "sheet_height", "sheet_share", "pages", "millimetres_per_unit",
+)  # fmt: skip
+
+
+def report_of(pattern: Pattern) -> dict[str, Any]:
+    """Return all measures of a pattern; see `Pattern.report`."""
+    finish = Finish.of(pattern.kind, pattern.settings)
+    shapes = piece_shapes(pattern.surface, pattern.borders, finish, pattern.tabs)
+    cut = [shape.cut for shape in shapes]
+    width, height = (shapely().total_bounds(cut)[2:] + EDGE).tolist()
+    paper = Paper.of(pattern.settings.get("page", "A4"))
+    strains, lengths = np.abs(pattern.strains), pattern.surface.edges.lengths
+    seams = [
+        {
+            "name": seam.name,
+            "pieces": [side.piece + 1 for side in seam.sides],
+            "lengths": list(seam.lengths),
+            "surface_length": seam.surface_length,
+            "ease": seam.ease if seam.is_eased else 0.0,
+            "is_dart": seam in pattern.darts,
+        }
+        for seam in pattern.seams
+    ]
+    area = float(sum(shape.inside.area for shape in shapes))
+    return {
+        "kind": pattern.kind,
+        "pieces": pattern.piece_count,
+        "seams": len(pattern.seams),
+        "darts": len(pattern.darts),
+        "eased_seams": sum(seam.is_eased for seam in pattern.seams),
+        "ease_max": max((seam.ease for seam in pattern.seams), default=0.0),
+        "seam_length": pattern.surface.seam_length,
+        "strain_max": float(strains.max()),
+        "strain_mean": float(np.average(strains, weights=lengths)),
+        "area": area,
+        "sheet_width": width,
+        "sheet_height": height,
+        "sheet_share": float(sum(shape.area for shape in cut)) / (width * height),
+        "pages": len(tiles_of(cut, width, height, paper)),
+        "millimetres_per_unit": pattern.millimetres,
+        "each_piece": [
+            {"number": i + 1, "width": piece_width, "height": piece_height, "area": piece_area}
+            for i, (piece_width, piece_height, piece_area) in enumerate(piece_sizes(pattern))
+        ],
+        "each_seam": seams,
+        "notes": list(pattern.notes),
+        "settings": dict(pattern.settings),
+    }
+
+
+def piece_sizes(pattern: Pattern) -> list[tuple[float, float, float]]:
+    """Return the width and the height of each piece without allowances, mm, and its area, mm^2."""
+    surface, sizes = pattern.surface, []
+    corners = surface.places
+    sides = corners[:, 1:] - corners[:, :1]
+    areas = (sides[:, 0, 0] * sides[:, 1, 1] - sides[:, 0, 1] * sides[:, 1, 0]) / 2
+    for piece in range(pattern.piece_count):
+        is_inside = surface.pieces == piece
+        width, height = np.ptp(corners[is_inside].reshape(-1, 2), axis=0).tolist()
+        sizes.append((width, height, float(areas[is_inside].sum())))
+    return sizes

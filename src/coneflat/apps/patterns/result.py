@@ -1,0 +1,110 @@
+"""The pattern of a surface: pieces in the plane, in millimetres, and how they are sewn together."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...base import EntryPoint, FloatArray, IntArray
+from .bends import Bend, find_bends
+from .borders import Borders, Seam, find_borders
+from .cut_surface import CutSurface
+from .drawing import Drawing
+from .finish import SEWN
+from .shapes import Tab
+
+_DRAWING = EntryPoint[Drawing]("apps.patterns.outlines:drawing_of")
+_WRITE = EntryPoint[Path]("apps.patterns.files:write_pattern")
+_REPORT = EntryPoint[dict[str, Any]]("apps.patterns.report:report_of")
+
+
+@dataclass(frozen=True, eq=False)
+class Pattern:
+    """Pieces of a surface that are cut out of cloth, paper or sheet; all lengths are millimetres.
+
+    Attributes:
+        kind: cloth, net, gores or sheet.
+        surface: the surface at its final size, cut into pieces, which lie side by side in the plane without overlap,
+            the grain along the second axis.
+        millimetres: millimetres per unit of the model.
+        folds: (f, 2) points of fold lines inside pieces, and `fold_angles` (f,) their dihedral angles in radians,
+            positive for mountain folds, negative for valleys.
+        tabs: tabs for glue, beside the pieces.
+        notes: what could not be met, one sentence each.
+        settings: the options.
+    """
+
+    kind: str
+    surface: CutSurface
+    millimetres: float
+    folds: IntArray = field(default_factory=lambda: np.empty((0, 2), dtype=np.int64))
+    fold_angles: FloatArray = field(default_factory=lambda: np.empty(0))
+    tabs: tuple[Tab, ...] = ()
+    notes: tuple[str, ...] = ()
+    settings: Mapping[str, Any] = field(default_factory=dict)
+
+    @cached_property
+    def borders(self) -> Borders:
+        """The borders of the pieces, their seams, darts and hems."""
+        return find_borders(self.surface)
+
+    @property
+    def piece_count(self) -> int:
+        """The number of pieces."""
+        return len(self.borders.loops)
+
+    @property
+    def is_sewn(self) -> bool:
+        """Whether it is a pattern for cloth, with seam allowances, notches, darts and a grain."""
+        return self.kind in SEWN
+
+    @property
+    def seams(self) -> tuple[Seam, ...]:
+        """The seams between different pieces or parts of pieces, darts among them."""
+        return self.borders.seams
+
+    @property
+    def darts(self) -> tuple[Seam, ...]:
+        """The seams that end in a tip inside a piece; none in nets and sheets, which are not sewn."""
+        return tuple(seam for seam in self.seams if seam.is_dart and self.is_sewn)
+
+    @cached_property
+    def bends(self) -> tuple[Bend, ...]:
+        """The bends of a sheet; none of other kinds, and of sheets that are stretched."""
+        return find_bends(self.surface) if self.kind == "sheet" else ()
+
+    @cached_property
+    def strains(self) -> FloatArray:
+        """(k,) the relative change of length of each edge of the pieces, `surface.edges`."""
+        return self.surface.edges.strains(self.surface.points)
+
+    def drawing(self) -> Drawing:
+        """Return the drawing: what is cut, folded and marked, with numbers and names, at its true size.
+
+        Raises:
+            OptionError: options of the pattern cannot be met, or shapely is not installed.
+        """
+        return self._drawn
+
+    @cached_property
+    def _drawn(self) -> Drawing:
+        return _DRAWING(self)
+
+    def save(self, path: str | PathLike[str]) -> Path:
+        """Write the pattern at its true size, and return the path: .pdf in pages, .svg or .dxf as a single sheet.
+
+        Raises:
+            UnknownFormatError, MeshFileError: the file cannot be written.
+            OptionError: options of the pattern cannot be met, or a package is not installed.
+        """
+        return _WRITE(self, path)
+
+    def report(self) -> dict[str, Any]:
+        """Return all measures as a dictionary that can be written as JSON; lengths in mm, areas in mm^2."""
+        return _REPORT(self)

@@ -1,0 +1,99 @@
+"""Shapes of pieces: their seam lines, and what is cut out, with allowances and tabs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...base import FloatArray, IntArray
+from .allowances import polygon_of, united, widened
+from .borders import Borders, Side
+from .cut_surface import CutSurface
+from .finish import HEM, Finish
+
+if TYPE_CHECKING:
+    from shapely import Polygon
+
+
+@dataclass(frozen=True, eq=False)
+class Tab:
+    """A tab for glue beside a piece.
+
+    Attributes:
+        polygon: (k, 2) its corners, mm, counterclockwise; it is folded along the line from the last to the first.
+        piece: the piece.
+    """
+
+    polygon: FloatArray
+    piece: int
+
+
+@dataclass(frozen=True, eq=False)
+class PieceShape:
+    """A piece in the plane.
+
+    Attributes:
+        seam_rings: the points (k, 2) of its borders, the outer one first.
+        inside: what its borders enclose.
+        cut: what is cut out: the piece with seam allowances and tabs.
+        is_wider: whether it has any.
+    """
+
+    seam_rings: tuple[FloatArray, ...]
+    inside: Polygon
+    cut: Polygon
+    is_wider: bool
+
+    @property
+    def cut_rings(self) -> tuple[FloatArray, ...]:
+        """The lines (k, 2) along which it is cut, without repeated ends."""
+        if not self.is_wider:
+            return self.seam_rings
+        return tuple(np.asarray(ring.coords)[:-1] for ring in (self.cut.exterior, *self.cut.interiors))
+
+
+def piece_shapes(
+    surface: CutSurface, borders: Borders, finish: Finish, tabs: tuple[Tab, ...] = ()
+) -> list[PieceShape]:
+    """Return the shapes of the pieces of a cut surface.
+
+    Raises:
+        OptionError: the finish names a seam that does not exist.
+    """
+    finish.check_names([seam.name for seam in borders.seams])
+    width = allowance_of_halfedges(len(surface.corners), borders, finish)
+    shapes = []
+    for piece, loops in enumerate(borders.loops):
+        rings = tuple(surface.points[tails(surface, loop)] for loop in loops)
+        inside = polygon_of(rings)
+        own_tabs = [tab.polygon for tab in tabs if tab.piece == piece]
+        has_allowance = any(width[loop].any() for loop in loops)
+        cut = widened(rings, [width[loop] for loop in loops], finish.is_round) if has_allowance else inside
+        if own_tabs:
+            cut = united([cut, *(polygon_of([points]) for points in own_tabs)])
+        shapes.append(PieceShape(rings, inside, cut, has_allowance or bool(own_tabs)))
+    return shapes
+
+
+def tails(surface: CutSurface, halfedges: IntArray) -> IntArray:
+    """Return (k,) the points at which half-edges begin, 3 times the triangle plus the corner opposite."""
+    return surface.corners[halfedges // 3, (halfedges + 1) % 3]
+
+
+def allowance_of_halfedges(triangles: int, borders: Borders, finish: Finish) -> FloatArray:
+    """Return (3m,) the width of the seam allowance at each half-edge, 0 inside pieces."""
+    width = np.zeros(3 * triangles)
+    for seam in borders.seams:
+        for side in seam.sides:
+            width[side.halfedges] = finish.width(seam.name)
+    for hem in borders.hems:
+        width[hem.halfedges] = finish.width(HEM)
+    return width
+
+
+def sides_of_pieces(borders: Borders) -> list[tuple[str, Side]]:
+    """Return all sides with the names of their seams, HEM for those that are sewn to nothing."""
+    of_seams = [(seam.name, side) for seam in borders.seams for side in seam.sides]
+    return [*of_seams, *((HEM, hem) for hem in borders.hems)]

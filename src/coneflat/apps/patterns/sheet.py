@@ -1,0 +1,78 @@
+"""Blanks of sheet metal and the like: one piece of a developable or nearly developable surface, with bend lines."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ... import TriangleMesh, unwrap
+from ...base import FloatArray, IntArray, inner_calls
+from ...errors import MeshError
+from ...geometry import angle_defect, corner_angles, edge_lengths
+from ...seams import find_seams
+from .cut_surface import CutSurface
+from .development import Development
+from .relaxing import least_strained
+from .separation import without_overlaps
+from .thickness import thickness_of
+
+# Smallest angle defect of a corner, radians: the surface is cut there if all curvature is in a few corners, so that the
+# blank is exact.
+MIN_CORNER = 0.05
+# Largest sum of the other angle defects, radians, and largest number of corners, of a surface that is cut there.
+MAX_REST, MAX_CORNERS = 1e-4, 48
+
+
+def develop_sheet(mesh: TriangleMesh) -> Development:
+    """Return one piece for each component of a surface, with as few cuts as possible and little strain.
+
+    Developable surfaces are exact. If the curvature of a surface is in a few corners, such as those of a box without
+    lid, it is cut from there to its border, and exact. Other curvature remains as strain. Bends: `find_bends`.
+
+    Args:
+        mesh: a mesh of one side of the sheet; closed surfaces are cut.
+
+    Raises:
+        MeshError: the mesh is a solid: a sheet with two sides.
+    """
+    seams = []
+    for component, vertices, _ in mesh.split_components():
+        thickness = thickness_of(component)
+        if thickness is not None:
+            raise MeshError(
+                f"the mesh is a solid that is {thickness:.3g} mm thick, but a sheet is given by one of its sides: "
+                f"delete the other side and the edges between them"
+            )
+        seams.append(vertices[component.edges[_cuts(component)]])
+    with inner_calls():
+        result = unwrap(mesh.vertices, mesh.faces, seams=("none", np.concatenate(seams)), charts="one")
+    return Development(without_overlaps(least_strained(CutSurface.of(result))))
+
+
+def _cuts(mesh: TriangleMesh) -> IntArray:
+    """Return the edges of a connected mesh to cut so that it is developable; none if it is curved beside corners.
+
+    Cuts reach all corners, and holes around which directions turn, such as the upper rim of a truncated cone.
+    """
+    angles = corner_angles(edge_lengths(mesh.vertices, mesh.faces))
+    defect = angle_defect(mesh.faces, angles, mesh.is_boundary_vertex)
+    inner = np.where(mesh.is_boundary_vertex, 0.0, np.abs(defect))
+    corners = np.flatnonzero(inner > MIN_CORNER)
+    holes = _holes(mesh)
+    flat_holes = [walk for walk in holes if abs(defect[mesh.tails[walk]].sum() + 2 * np.pi) <= MAX_REST]
+    is_curved = inner.sum() - inner[corners].sum() > MAX_REST or len(corners) > MAX_CORNERS
+    if is_curved or (not len(corners) and len(flat_holes) == len(holes)):
+        return np.empty(0, dtype=np.int64)
+    return find_seams(mesh, corners, _edge_lengths(mesh), kept_holes=flat_holes)
+
+
+def _holes(mesh: TriangleMesh) -> list[IntArray]:
+    """Return the half-edges of each boundary loop but the longest."""
+    lengths = _edge_lengths(mesh)
+    return sorted(mesh.boundary_walks(), key=lambda walk: float(lengths[mesh.halfedge_edges[walk]].sum()))[
+        :-1
+    ]
+
+
+def _edge_lengths(mesh: TriangleMesh) -> FloatArray:
+    ends = mesh.vertices[mesh.edges]
+    return np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)

@@ -1,0 +1,100 @@
+"""Lengths with units, and the scale from a model to millimetres."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+from ...base import short_repr
+from ...errors import OptionError
+from ...options import Kind
+
+#: Millimetres per unit.
+MILLIMETRES: Mapping[str, float] = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4}
+_LENGTH = re.compile(r"\s*([0-9.]+(?:[eE][-+]?[0-9]+)?)\s*(mm|cm|m|in|)\s*")
+_PERCENT = re.compile(r"\s*([0-9.]+(?:[eE][-+]?[0-9]+)?)\s*%\s*")
+
+
+@dataclass(frozen=True)
+class Length(Kind):
+    """A length in millimetres, or a text with a unit such as "7mm", "0.5cm" or "1in".
+
+    Attributes:
+        optional: None is allowed, also as the word "none".
+        is_positive: the length must be above 0, not only 0 or more.
+    """
+
+    metavar: ClassVar[str] = "LENGTH"
+    optional: bool = False
+    is_positive: bool = False
+
+    def parse(self, name: str, value: Any) -> float | None:
+        if self.optional and (value is None or (isinstance(value, str) and value == "none")):
+            return None
+        length = length_of(value)
+        if length is None or length < 0 or (self.is_positive and length == 0):
+            bound = "above 0" if self.is_positive else "0 or more"
+            raise OptionError(
+                f"{name} must be a length, {bound}, such as 7mm, 0.7cm or 0.25in, got {short_repr(value)}"
+            )
+        return length
+
+
+@dataclass(frozen=True)
+class Percentage(Kind):
+    """A fraction above 0, or a text such as "3%".
+
+    Attributes:
+        maximum: the largest fraction.
+        optional: None is allowed, also as the word "none".
+    """
+
+    metavar: ClassVar[str] = "PERCENT"
+    maximum: float = 1.0
+    optional: bool = False
+
+    def parse(self, name: str, value: Any) -> float | None:
+        if self.optional and (value is None or (isinstance(value, str) and value == "none")):
+            return None
+        fraction = _fraction(value)
+        if fraction is None or not 0 < fraction <= self.maximum:
+            raise OptionError(
+                f"{name} must be above 0 % and at most {100 * self.maximum:g} %, such as 3% or 0.03, got "
+                f"{short_repr(value)}"
+            )
+        return fraction
+
+
+def length_of(value: Any) -> float | None:
+    """Return a length in millimetres from a number or a text with a unit; None if it is neither."""
+    match = _LENGTH.fullmatch(value) if isinstance(value, str) else None
+    try:
+        number = float(match[1] if match else value) if match or not isinstance(value, str) else math.nan
+    except (TypeError, ValueError):
+        return None
+    length = number * MILLIMETRES[match[2] or "mm"] if match else number
+    return length if math.isfinite(length) else None
+
+
+def _fraction(value: Any) -> float | None:
+    match = _PERCENT.fullmatch(value) if isinstance(value, str) else None
+    try:
+        return float(match[1]) / 100 if match else float(value)
+    except (TypeError, ValueError):
+        return None
+
+
+def text_of_size(extents: Any) -> str:
+    """Return an extent of three lengths in millimetres as a text, such as "120 x 80 x 60 mm"."""
+    longest = max(extents)
+    unit, factor = ("m", 1000.0) if longest >= 10_000 else ("mm", 1.0)
+    return " x ".join(f"{extent / factor:.3g}" for extent in extents) + f" {unit}"
+
+
+def area_text(area: float) -> str:
+    """Return an area in mm^2 as a text in square centimetres, with three digits or more."""
+    centimetres = area / 100
+    return f"{centimetres:.0f} cm\u00b2" if centimetres >= 100 else f"{centimetres:.3g} cm\u00b2"

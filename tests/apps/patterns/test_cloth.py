@@ -1,0 +1,212 @@
+"""Cloth: strain within its bound, seams with equal sides, and what the options promise."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import shapes
+
+import coneflat
+from coneflat import TriangleMesh
+from coneflat.apps.patterns.borders import find_borders, letters
+from coneflat.apps.patterns.cut_surface import CutSurface
+from coneflat.apps.patterns.simplification import simplified
+from coneflat.apps.patterns.smooth_seams import with_smooth_seams
+from coneflat.apps.patterns.strain import FlatEdges, Stretch, _PowerSum, least_strain, with_equal_sides
+from coneflat.apps.patterns.units import length_of
+from coneflat.errors import OptionError
+from coneflat.geometry import signed_double_areas, surface_distances
+
+
+@pytest.fixture(scope="module")
+def ball():
+    """A bumpy sphere of 1,280 triangles and its pattern of 100 mm in height, with a strain of 8 %."""
+    vertices, faces = shapes.sphere(3)
+    return (vertices, faces), coneflat.pattern(vertices, faces, height=100, strain=0.08, page="none")
+
+
+def cut_sphere(energy=4.05):
+    """A sphere of 320 triangles, cut as a texture is."""
+    return CutSurface.of(coneflat.unwrap(*shapes.sphere(2), max_energy=energy, packing_cuts=0))
+
+
+def test_the_gradient_of_the_sum_of_powers_is_its_derivative():
+    surface = cut_sphere()
+    edges, stretch = surface.edges, Stretch(0.05, 0.1)
+    model = _PowerSum(edges, surface.corners, stretch, 4)
+    rng = np.random.default_rng(0)
+    points = surface.points + 1e-3 * rng.standard_normal(surface.points.shape)
+    bounds = stretch.bounds(edges.vectors(points))
+    gradient, hessian = model.derivatives(points, bounds)
+    direction = rng.standard_normal(points.shape)
+    step = 1e-6
+    values = [model.value(points + sign * step * direction, bounds) for sign in (1, -1)]
+    assert gradient @ direction.ravel() == pytest.approx((values[0] - values[1]) / (2 * step), rel=1e-5)
+    assert abs(hessian - hessian.T).max() <= 1e-9 * abs(hessian).max()
+
+
+def test_a_developable_surface_has_no_strain():
+    angle, height = np.meshgrid(np.linspace(0, 2, 9), np.linspace(0, 1, 4))
+    vertices = np.stack([np.cos(angle), np.sin(angle), height], axis=-1).reshape(-1, 3)
+    i = (np.arange(3)[:, None] * 9 + np.arange(8)).ravel()
+    faces = np.concatenate([np.stack([i, i + 1, i + 10], axis=1), np.stack([i, i + 10, i + 9], axis=1)])
+    mesh = TriangleMesh(vertices, faces)
+    flat = np.stack([angle.ravel(), 1.1 * height.ravel()], axis=1)
+    edges = FlatEdges.of(mesh, faces)
+    points = least_strain(edges, mesh.faces, flat, Stretch(0.05, 0.05))
+    assert np.abs(edges.strains(points)).max() < 1e-6
+
+
+def test_relaxing_flips_nothing_and_lowers_the_largest_strain():
+    surface = cut_sphere()
+    points = least_strain(surface.edges, surface.corners, surface.points, Stretch(0.05, 0.05))
+    assert (signed_double_areas(points[surface.corners]) > 0).all()
+    before, after = (np.abs(surface.edges.strains(p)).max() for p in (surface.points, points))
+    assert after < 0.7 * before
+
+
+def test_points_that_are_not_free_stay():
+    surface = cut_sphere()
+    is_free = np.zeros(len(surface.points), dtype=bool)
+    is_free[surface.corners[:40]] = True
+    points = least_strain(surface.edges, surface.corners, surface.points, Stretch(0.05, 0.05), (4,), is_free)
+    assert np.array_equal(points[~is_free], surface.points[~is_free])
+    assert not np.array_equal(points, surface.points)
+
+
+def test_both_sides_of_seams_become_equally_long():
+    surface = cut_sphere()
+    points = with_equal_sides(surface.edges, surface.corners, surface.points)
+    lengths = np.linalg.norm(surface.edges.vectors(points), axis=1)
+    first, second = surface.edges.partners.T
+    assert len(first)
+    assert lengths[first] == pytest.approx(lengths[second], rel=1e-11)
+    assert np.abs(points - surface.points).max() < 0.2
+
+
+def test_cloth_is_within_its_strain_without_overlaps(ball):
+    _, result = ball
+    assert np.abs(result.strains).max() <= 0.08
+    assert result.notes == ()
+    assert not len(result.surface.overlaps())
+    assert max(seam.largest_gap for seam in result.seams) < 1e-6
+    assert sum(seam.surface_length for seam in result.seams) == pytest.approx(result.surface.seam_length)
+    heights = np.ptp(result.surface.mesh.vertices, axis=0)
+    assert heights.max() == pytest.approx(100, rel=0.2)
+
+
+@pytest.mark.parametrize("factor", [1e-6, 1e6])
+def test_scale_position_and_numbering_do_not_matter(ball, factor):
+    (vertices, faces), result = ball
+    order = np.random.default_rng(1).permutation(len(vertices))
+    number = np.argsort(order)
+    moved = factor * (vertices[order] + 5.0)
+    moved_result = coneflat.pattern(moved, number[faces], height=100, strain=0.08, page="none")
+    assert moved_result.piece_count == result.piece_count
+    assert moved_result.surface.seam_length == pytest.approx(result.surface.seam_length, rel=0.02)
+    assert np.abs(moved_result.strains).max() <= 0.08
+
+
+def test_less_strain_needs_longer_seams(ball):
+    (vertices, faces), result = ball
+    tighter = coneflat.pattern(vertices, faces, height=100, strain="4%", page="none")
+    assert np.abs(tighter.strains).max() <= 0.04
+    assert tighter.surface.seam_length > result.surface.seam_length
+
+
+def test_strain_may_differ_along_the_grain(ball):
+    (vertices, faces), _ = ball
+    stretch = {"stretch_warp": "4%", "stretch_weft": "20%"}
+    result = coneflat.pattern(vertices, faces, height=100, **stretch, page="none")
+    vectors = result.surface.edges.vectors(result.surface.points)
+    share = vectors[:, 1] ** 2 / (vectors**2).sum(axis=1)
+    bounds = 0.04 * share + 0.2 * (1 - share)
+    assert (np.abs(result.strains) <= bounds * (1 + 1e-6)).all()
+    assert np.abs(result.strains).max() > 0.05
+
+
+def test_without_darts_no_cut_ends_inside_a_piece(ball):
+    (vertices, faces), result = ball
+    assert len(result.darts)
+    dartless = coneflat.pattern(vertices, faces, height=100, strain=0.08, darts="none", page="none")
+    assert not len(dartless.darts)
+    assert np.abs(dartless.strains).max() <= 0.08
+
+
+def test_named_edges_are_seams(ball):
+    (vertices, faces), _ = ball
+    around = faces[(faces == 0).any(axis=1)]
+    pairs = np.array([np.roll(face, -int(np.flatnonzero(face == 0)[0]))[1:] for face in around])
+    result = coneflat.pattern(vertices, faces, height=100, strain=0.3, seams=pairs, tolerance=0, page="none")
+    cut = {tuple(edge) for edge in result.surface.mesh.edges[result.surface.seams].tolist()}
+    named = {tuple(sorted(pair)) for pair in pairs.tolist()}
+    assert len(named) >= 5
+    assert named <= cut  # though they cut off a small piece
+
+
+def test_smooth_seams_stay_near_the_surface():
+    surface = cut_sphere()
+    tolerance = 0.02
+    smooth = with_smooth_seams(surface, tolerance)
+    before, after = surface.mesh, smooth.mesh
+    assert np.abs(after.vertices - before.vertices).max() > 0.01
+    assert surface_distances(before.vertices, before.faces, after.vertices).max() <= tolerance
+    assert surface_distances(after.vertices, after.faces, before.vertices).max() <= tolerance
+    assert smooth.seam_length < surface.seam_length
+    assert with_smooth_seams(surface, 0.0) is surface
+
+
+def test_dense_meshes_are_simplified_within_the_tolerance():
+    mesh = TriangleMesh(*shapes.sphere(5))
+    coarse, distances = simplified(mesh, 0.01)
+    assert len(coarse.faces) < len(mesh.faces) / 2
+    assert 0 < distances.mean() <= 0.01
+    assert distances.max() >= surface_distances(coarse.vertices, coarse.faces, mesh.vertices).max()
+    assert simplified(mesh, 1e-9)[0] is mesh
+
+
+def test_every_border_half_edge_is_on_one_side(ball):
+    _, result = ball
+    borders = find_borders(result.surface)
+    sides = [side for seam in borders.seams for side in seam.sides] + list(borders.hems)
+    on_sides = np.concatenate([side.halfedges for side in sides])
+    on_loops = np.concatenate([loop for loops in borders.loops for loop in loops])
+    assert np.array_equal(np.sort(on_sides), np.sort(on_loops))
+    assert len(np.unique(on_sides)) == len(on_sides)
+
+
+@pytest.mark.parametrize(
+    ("number", "name"), [(0, "A"), (25, "Z"), (26, "AA"), (27, "AB"), (701, "ZZ"), (702, "AAA")]
+)
+def test_letters_continue_after_z(number, name):
+    assert letters(number) == name
+
+
+@pytest.mark.parametrize(
+    ("text", "length"), [("7mm", 7.0), ("0.7cm", 7.0), ("1in", 25.4), ("2 m", 2000.0), (3, 3.0), ("x", None)]
+)
+def test_lengths_have_units(text, length):
+    assert length_of(text) == length
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({}, "has no unit: give unit as mm"),
+        ({"height": "0mm"}, "height must be a length, above 0"),
+        ({"height": 100, "unit": "mm"}, "height and unit or scale cannot be combined"),
+        ({"unit": "mm", "strain": "0%"}, "strain must be above 0"),
+        ({"unit": "mm", "kind": "net", "seams": [[0, 1]]}, "only cloth takes seams"),
+        ({"unit": "furlong"}, "unknown unit"),
+    ],
+)
+def test_errors_say_what_to_do(options, message):
+    with pytest.raises(OptionError, match=message):
+        coneflat.pattern(*shapes.sphere(1), **options)
+
+
+def test_the_size_is_that_of_the_unit():
+    vertices, faces = shapes.sphere(1)
+    inches = coneflat.pattern(vertices, faces, unit="in", kind="net", page="none")
+    assert inches.millimetres == 25.4
+    assert np.ptp(inches.surface.mesh.vertices, axis=0) == pytest.approx(25.4 * np.ptp(vertices, axis=0))

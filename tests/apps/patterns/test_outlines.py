@@ -1,0 +1,299 @@
+"""What is drawn of pieces: allowances, notches, names."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import combinations
+
+import numpy as np
+import pytest
+from flat_pieces import gores, sheet, two_pieces, with_dart
+
+import coneflat
+from coneflat import Pattern
+from coneflat.apps.patterns.allowances import polygon_of, widened
+from coneflat.apps.patterns.borders import find_borders
+from coneflat.apps.patterns.finish import Finish, read_allowances
+from coneflat.apps.patterns.labels import box_of
+from coneflat.apps.patterns.nesting import GAP, grain_up, nested
+from coneflat.apps.patterns.notches import distances, notches_of
+from coneflat.apps.patterns.shapes import Tab, piece_shapes
+from coneflat.errors import OptionError
+
+shapely = pytest.importorskip("shapely")
+
+SQUARE = np.array([[0.0, 0], [100, 0], [100, 100], [0, 100]])
+CORNER = np.array([[0.0, 0], [100, 0], [100, 40], [40, 40], [40, 100], [0, 100]])
+
+
+def uniform(ring, width):
+    return np.full(len(ring), float(width))
+
+
+def shapes_of(pattern):
+    finish = Finish.of(pattern.kind, pattern.settings)
+    return piece_shapes(pattern.surface, pattern.borders, finish, pattern.tabs)
+
+
+def lengths_of(lines):
+    return [
+        distances(np.vstack([line.points, line.points[:1]]) if line.is_closed else line.points)[-1]
+        for line in lines
+    ]
+
+
+def test_a_mitred_allowance_has_the_area_of_its_strips_and_corners():
+    assert widened([SQUARE], [uniform(SQUARE, 7)]).area == pytest.approx(114**2)
+    # Five corners add a square, and one takes it away.
+    expected = 6400 + 400 * 5 + 4 * 25
+    assert widened([CORNER], [uniform(CORNER, 5)]).area == pytest.approx(expected)
+
+
+def test_a_round_allowance_has_the_area_of_its_strips_and_arcs():
+    area = widened([SQUARE], [uniform(SQUARE, 7)], is_round=True).area
+    assert area == pytest.approx(100**2 + 400 * 7 + np.pi * 49, rel=1e-5)
+
+
+def test_single_seams_have_allowances_of_their_own():
+    wide = widened([SQUARE], [np.array([10.0, 2.0, 0.0, 5.0])])
+    assert wide.bounds == pytest.approx((-5, -10, 102, 100))
+    assert wide.area == pytest.approx(107 * 110)
+
+
+def test_a_hole_becomes_narrower():
+    hole = (SQUARE * 0.4 + 30)[::-1]
+    wide = widened([SQUARE, hole], [uniform(SQUARE, 0), uniform(hole, 6)])
+    assert wide.area == pytest.approx(100**2 - 28**2)
+    assert len(wide.interiors) == 1
+    assert not widened([SQUARE, hole], [uniform(SQUARE, 0), uniform(hole, 25)]).interiors
+
+
+@pytest.mark.parametrize("is_round", [True, False])
+def test_an_allowance_is_nowhere_too_narrow_and_corners_are_trimmed(is_round):
+    rng = np.random.default_rng(3)
+    angles = np.sort(rng.random(60)) * 2 * np.pi
+    ring = (50 + 30 * rng.random(60))[:, None] * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    piece = polygon_of([ring])
+    wide = widened([ring], [uniform(ring, 6)], is_round)
+    # Chords of arcs are a little inside of them.
+    assert wide.buffer(0.06).contains(piece.buffer(6))
+    # A trimmed corner ends twice as far out, over the whole width of both allowances.
+    assert piece.buffer(6.1 if is_round else 6 * 5**0.5 + 0.1).contains(wide)
+
+
+def test_pockets_between_allowances_are_filled():
+    outside = [[0.0, 0], [60, 0], [60, 60], [31, 60]]
+    around_pocket = [[31, 50], [50, 50], [50, 10], [10, 10], [10, 50], [29, 50]]
+    ring = np.array([*outside, *around_pocket, [29, 60], [0, 60]])
+    wide = widened([ring], [uniform(ring, 2)])
+    assert not wide.interiors
+    assert wide.area == pytest.approx(64 * 64)
+
+
+def test_without_allowance_the_cut_line_is_the_border_itself():
+    drawing = two_pieces(allowance=0.0).drawing()
+    assert sorted(lengths_of(line for line in drawing.lines if line.layer == "cut")) == pytest.approx(
+        [280, 280]
+    )
+
+
+def test_with_allowance_all_sides_are_drawn_inside():
+    pattern = two_pieces(allowance=5.0)
+    dashed = [line for line in pattern.drawing().lines if line.layer == "mark" and line.dashes]
+    sides = [*pattern.borders.hems, *(side for seam in pattern.seams for side in seam.sides)]
+    expected = [distances(pattern.surface.points[side.points])[-1] for side in sides]
+    assert sorted(lengths_of(dashed)) == pytest.approx(sorted(expected))
+    assert sum(expected) == pytest.approx(560)
+
+
+def test_seams_are_named_in_allowances():
+    pattern = two_pieces(allowance=0.0, seam_allowances="A=10mm")
+    assert [shape.cut.area for shape in shapes_of(pattern)] == pytest.approx([70 * 80] * 2)
+    with pytest.raises(
+        OptionError, match="names the seam Q, which the pattern does not have: its seams are A"
+    ):
+        two_pieces(seam_allowances="Q=1cm").drawing()
+
+
+def test_hems_have_a_name_in_allowances():
+    pattern = two_pieces(allowance=0.0, seam_allowances="hem=10")
+    assert [shape.cut.area for shape in shapes_of(pattern)] == pytest.approx([70 * 100] * 2)
+
+
+@pytest.mark.parametrize("text", ["A", "A=", "A=-1mm", "=3mm", "A=3kg"])
+def test_allowances_that_cannot_be_read_are_errors(text):
+    with pytest.raises(OptionError, match=r"such as A=10mm,B=0, got"):
+        read_allowances(text)
+
+
+def test_allowances_are_read():
+    assert read_allowances("A=10mm, B=0,hem=1in") == {"A": 10.0, "B": 0.0, "hem": 25.4}
+
+
+def test_notches_match_along_both_sides():
+    pattern = gores(radius=100.0)
+    points = pattern.surface.points
+    for seam in pattern.seams:
+        first, second = notches_of(seam, points)
+        assert len(first) == len(second) > 1
+        for notches, side in zip((first, second), seam.sides, strict=True):
+            assert [notch.is_double for notch in notches] == [True] + [False] * (len(notches) - 1)
+            line = shapely.LineString(points[side.points])
+            at = [line.project(shapely.Point(notch.place)) for notch in notches]
+            assert [line.distance(shapely.Point(notch.place)) for notch in notches] == pytest.approx(
+                [0] * len(at)
+            )
+            from_end = at if side is seam.sides[0] else [line.length - place for place in at]
+            assert from_end == pytest.approx((np.arange(len(at)) + 0.5) / len(at) * line.length)
+
+
+def test_a_single_notch_is_not_in_the_middle():
+    (seam,) = two_pieces().seams
+    first, second = notches_of(seam, two_pieces().surface.points)
+    assert len(first) == 1
+    assert {float(notch.place[1]) for notch in (*first, *second)} == {32.0}
+
+
+def test_short_seams_and_darts_have_no_notches():
+    pattern = with_dart()
+    assert [notches_of(seam, pattern.surface.points) for seam in pattern.seams] == [([], [])]
+    small = Pattern("cloth", replace(two_pieces().surface, points=two_pieces().surface.points / 10), 1.0)
+    assert notches_of(small.seams[0], small.surface.points) == ([], [])
+
+
+def test_notches_point_out_of_the_piece():
+    pattern = two_pieces()
+    for notches, shape in zip(
+        notches_of(pattern.seams[0], pattern.surface.points), shapes_of(pattern), strict=True
+    ):
+        for notch in notches:
+            assert not shape.inside.contains(shapely.Point(notch.place + 0.1 * notch.outward))
+            assert shape.inside.contains(shapely.Point(notch.place - 0.1 * notch.outward))
+
+
+def test_a_seam_whose_sides_differ_says_by_how_much():
+    pattern = nested(two_pieces(shrink=0.98))
+    texts = [text.text for text in pattern.drawing().texts]
+    assert "A (2), ease 1.6 mm" in texts
+    assert "A (1)" in texts
+    report = pattern.report()
+    assert (report["eased_seams"], report["ease_max"]) == (1, pytest.approx(1.6))
+    first, second = notches_of(pattern.seams[0], pattern.surface.points)
+    assert len(first) == len(second)
+
+
+def test_a_dart_is_marked_and_its_wedge_is_not_cut_out():
+    pattern = with_dart(allowance=6.0)
+    assert len(pattern.darts) == 1
+    drawing = pattern.drawing()
+    assert [text.text for text in drawing.texts].count("dart A") == 2
+    tip = pattern.surface.points[pattern.darts[0].tip]
+    assert any(line.is_closed and np.allclose(line.points.mean(axis=0), tip) for line in drawing.lines)
+    (shape,) = shapes_of(pattern)
+    assert shape.cut.contains(shapely.Point(tip - [0, 5]))
+
+
+@pytest.mark.parametrize("count", [6, 30])
+def test_no_text_covers_another_and_names_are_inside(count):
+    pattern = nested(gores(count, radius=60.0))
+    drawing = pattern.drawing()
+    boxes = [box_of(text) for text in drawing.texts]
+    assert not [pair for pair in combinations(boxes, 2) if pair[0].intersects(pair[1])]
+    numbers = {text.text for text in drawing.texts}
+    assert {str(i + 1) for i in range(count)} <= numbers
+    cut = [shape.cut for shape in shapes_of(pattern)]
+    assert all(any(piece.contains(box) for piece in cut) for box in boxes)
+    names = [text.text.split()[0] for text in drawing.texts if "(" in text.text]
+    assert all(names.count(seam.name) == 2 for seam in pattern.seams)
+
+
+def test_straight_parts_of_seams_of_nets_have_names_of_their_own():
+    pattern = two_pieces("net")
+    assert sorted(text.text for text in pattern.drawing().texts if text.text.startswith("A")) == [
+        "A (1)",
+        "A (2)",
+    ]
+    bent = gores(4, 6, kind="net", page="A3")
+    names = [text.text for text in nested(bent).drawing().texts]
+    assert names.count("A1 (2)") + names.count("A1 (4)") == 1
+
+
+def test_tabs_are_cut_out_with_their_piece():
+    tab = Tab(np.array([[60.0, 10], [66, 16], [66, 64], [60, 70]]), 0)
+    pattern = replace(two_pieces("net"), tabs=(tab,))
+    assert [shape.cut.area for shape in shapes_of(pattern)] == pytest.approx([4800 + 54 * 6, 4800])
+    folds = [line for line in pattern.drawing().lines if line.layer == "fold"]
+    assert lengths_of(folds) == pytest.approx([60])
+
+
+def test_folds_are_dashed_by_their_kind_with_their_angle():
+    surface = sheet()
+    ends = np.array([[5, 9], [10, 14]])
+    pattern = Pattern("net", surface, 1.0, folds=ends, fold_angles=np.radians([90.0, -30.0]))
+    folds = [line for line in pattern.drawing().lines if line.layer == "fold"]
+    assert folds[0].dashes != folds[1].dashes
+    assert [len(line.dashes) for line in folds] == [4, 2]
+    assert {"90\u00b0", "30\u00b0"} <= {text.text for text in pattern.drawing().texts}
+
+
+def test_bends_are_drawn_where_their_piece_is_placed():
+    corners = [[x, y, z] for y in (0, 80) for x, z in ((0, 0), (60, 0), (60, 40))]
+    faces = [[0, 1, 4], [0, 4, 3], [1, 2, 5], [1, 5, 4]]
+    placed = coneflat.pattern(corners, faces, kind="sheet", unit="mm", page="none")
+    (bend,), (shape,) = placed.bends, shapes_of(placed)
+    assert shape.inside.buffer(1e-6).contains(shapely.LineString(bend.line))
+    drawing = placed.drawing()
+    assert "90\u00b0" in {text.text for text in drawing.texts}
+    assert lengths_of(line for line in drawing.lines if line.layer == "fold") == pytest.approx([80])
+
+
+@pytest.mark.parametrize("page", ["A4", "A2", "roll:300mm", "none"])
+@pytest.mark.parametrize("kind", ["gores", "sheet"])
+def test_nested_pieces_are_apart_and_move_rigidly(kind, page):
+    pattern = gores(7, 8, radius=45.0, kind=kind, page=page)
+    placed = nested(pattern)
+    cut = [shape.cut for shape in shapes_of(placed)]
+    gaps = [first.distance(second) for first, second in combinations(cut, 2)]
+    assert min(gaps) >= GAP - 1e-9
+    assert np.min([shape.bounds[:2] for shape in cut]) >= 1 - 1e-9
+    before, after = (
+        np.sort(p.surface.edges.vectors(p.surface.points) ** 2 @ [1, 1]) for p in (pattern, placed)
+    )
+    assert after == pytest.approx(before)
+    if kind == "gores":
+        vectors = [p.surface.edges.vectors(p.surface.points) for p in (pattern, placed)]
+        assert np.abs(vectors[0]) == pytest.approx(np.abs(vectors[1]), abs=1e-9)
+    assert nested(pattern).surface.points.tolist() == placed.surface.points.tolist()
+    share = placed.report()["sheet_share"]
+    assert (0.2 if page == "A4" else 0.4) < share < 1  # On pages, rows of whole pieces leave a part empty.
+
+
+def test_pieces_that_fit_on_pages_cross_no_border():
+    placed = nested(gores(12, 8, radius=60.0, page="A4"))
+    boxes = np.array([shape.cut.bounds for shape in shapes_of(placed)])
+    assert (boxes[:, 0] // 190 == boxes[:, 2] // 190).all()
+    assert (boxes[:, 1] // 277 == boxes[:, 3] // 277).all()
+
+
+def test_a_piece_wider_than_the_roll_is_an_error():
+    with pytest.raises(OptionError, match=r"a piece is 74 mm wide and the roll 58 mm without its margins"):
+        nested(two_pieces(page="roll:80mm"))
+
+
+def test_a_roll_takes_pieces_of_nets_at_any_angle():
+    long = Pattern("sheet", sheet(200.0, 20.0), 1.0, settings={"page": "roll:60mm"})
+    assert nested(long).report()["sheet_height"] > 200
+
+
+def test_the_grain_points_up():
+    surface = sheet()
+    angle = 0.7
+    turned = surface.points @ np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+    turned_up = grain_up(replace(surface, points=turned), np.array([0.0, 1.0, 0.0]))
+    flat = turned_up.points - turned_up.points.mean(axis=0)
+    assert flat == pytest.approx(surface.points - surface.points.mean(axis=0), abs=1e-9)
+
+
+def test_borders_of_a_pattern_by_hand():
+    borders = find_borders(two_pieces().surface)
+    assert [seam.lengths for seam in borders.seams] == [pytest.approx((80, 80))]

@@ -1,0 +1,165 @@
+"""Papers and tiles, rulers and the map of pages."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from flat_pieces import gores, sheet, two_pieces
+
+from coneflat import Pattern
+from coneflat.apps.patterns.assembly import pattern_pages
+from coneflat.apps.patterns.drawing import Drawing, Line
+from coneflat.apps.patterns.labels import box_of
+from coneflat.apps.patterns.nesting import nested
+from coneflat.apps.patterns.pages import cut_shapes, page_map, ruler, tiled
+from coneflat.apps.patterns.papers import PAGE_SIZES, Paper
+from coneflat.apps.patterns.tiling import tiles_of
+from coneflat.errors import OptionError
+
+shapely = pytest.importorskip("shapely")
+
+
+def square(side: float, low=(1.0, 1.0)):
+    return shapely.box(*low, low[0] + side, low[1] + side)
+
+
+def pages_of(pattern):
+    paper = Paper.of(pattern.settings["page"])
+    return pattern_pages(pattern, pattern.drawing(), paper, "toy"), paper
+
+
+@pytest.mark.parametrize("name", PAGE_SIZES)
+def test_papers_have_a_size(name):
+    paper = Paper.of(name.upper())
+    assert (paper.width, paper.height) == PAGE_SIZES[name]
+    assert paper.inner_width == pytest.approx(paper.width - 20)
+
+
+@pytest.mark.parametrize("name", ["A9", "roll", "roll:", "roll:3mm", "roll:900kg", "letterbox", ""])
+def test_other_papers_are_errors(name):
+    with pytest.raises(OptionError, match="page must be A0, A1,"):
+        Paper.of(name)
+
+
+def test_rolls_take_any_unit():
+    assert Paper.of("roll:36in").width == pytest.approx(914.4)
+
+
+def test_the_number_of_tiles_follows_from_the_overlap():
+    # 190 + 180 + 180 >= 401, and 277 + 267 >= 401.
+    tiles = tiles_of([square(400)], 402.0, 402.0, Paper.of("A4"))
+    assert [tile.name for tile in tiles] == ["A1", "A2", "A3", "B1", "B2", "B3"]
+    assert tiles[0].overlaps
+    assert tiles[0].high[0] - tiles[1].low[0] == pytest.approx(10)
+    assert tiles[3].high[1] - tiles[0].low[1] == pytest.approx(10)
+    assert tiles[1].neighbours == ("A1", "B2", "A3", "")
+    covered = shapely.union_all([shapely.box(*tile.low, *tile.high) for tile in tiles])
+    assert covered.covers(square(400))
+
+
+def test_empty_tiles_are_left_out():
+    shapes = [square(60), square(60, (330.0, 330.0)), shapely.box(1, 100, 260, 120)]
+    tiles = tiles_of(shapes, 391.0, 391.0, Paper.of("A4"))
+    assert [tile.name for tile in tiles] == ["A2", "A3", "B1", "B2"]
+    assert tiles[0].neighbours == ("", "B2", "A3", "")
+
+
+def test_a_tile_inside_a_large_piece_is_not_left_out():
+    assert len(tiles_of([square(900)], 902.0, 902.0, Paper.of("A4"))) == 5 * 4
+
+
+def test_tiles_do_not_overlap_where_no_piece_crosses_their_borders():
+    tiles = tiles_of([square(150), square(150, (191.0, 1.0))], 342.0, 152.0, Paper.of("A4"))
+    assert [tile.name for tile in tiles] == ["A1", "A2"]
+    assert not tiles[0].overlaps
+    assert tiles[0].high[0] == tiles[1].low[0]
+
+
+def test_each_point_of_a_line_is_visible_on_a_page_at_its_true_size():
+    pattern = nested(Pattern("sheet", sheet(500.0, 350.0), 1.0, settings={"page": "A4"}))
+    drawing = pattern.drawing()
+    seen = {}
+    for page in tiled(drawing, Paper.of("A4"), "toy"):
+        low, high = page.window
+        assert (high - low).tolist() == pytest.approx([190, 277])
+        for line in page.content.lines:
+            if line.layer == "cut":
+                ring = shapely.LinearRing(line.points)
+                shift = tuple(np.round(drawing.lines[0].points[0] - line.points[0], 9))
+                seen[shift] = shapely.transform(
+                    shapely.intersection(ring, shapely.box(*low, *high)), lambda points, s=shift: points + s
+                )
+    border = shapely.LinearRing(drawing.lines[0].points)
+    joined = shapely.union_all(list(seen.values()))
+    assert len(seen) == 4
+    assert joined.hausdorff_distance(border) < 1e-6
+
+
+def test_rulers_have_their_length():
+    lines = ruler(np.zeros(2), Paper.of("A4")).lines
+    assert max(np.ptp(line.points[:, 0]) for line in lines) == 100
+    inches = ruler(np.zeros(2), Paper.of("letter")).lines
+    assert sorted({round(np.ptp(line.points[:, 0]), 6) for line in inches}) == [0, 100, 101.6]
+
+
+def test_the_map_shows_each_page_within_its_place():
+    drawing = nested(gores(12, 8, radius=120.0, page="A4")).drawing()
+    paper = Paper.of("A4")
+    shown = page_map(drawing, paper, np.array([10.0, 20.0]), np.array([150.0, 80.0]))
+    names = [tile.name for tile in tiles_of(cut_shapes(drawing), drawing.width, drawing.height, paper)]
+    assert [text.text for text in shown.texts] == names
+    points = np.vstack([line.points for line in shown.lines])
+    assert (points.min(axis=0) >= [10 - 1e-9, 20 - 1e-9]).all()
+    assert (points.max(axis=0) <= [160 + 1e-9, 100 + 1e-9]).all()
+
+
+@pytest.mark.parametrize("page", ["A4", "A5", "letter"])
+def test_the_guide_comes_first_and_lists_all_pieces_and_seams(page):
+    pattern = nested(gores(9, 8, radius=50.0, page=page))
+    pages, paper = pages_of(pattern)
+    texts = [text.text for page in pages if page.content is None for text in page.drawing.texts]
+    assert {seam.name for seam in pattern.seams} <= set(texts)
+    assert any(text.startswith("gores: 9 pieces, 9 seams") for text in texts)
+    assert len(pages[0].pictures) == 2
+    assert pages[0].pictures[0].pixels.std() > 10
+    assert all((page.drawing.width, page.drawing.height) == (paper.width, paper.height) for page in pages)
+    for page in pages:
+        boxes = shapely.union_all([box_of(text) for text in page.drawing.texts])
+        assert shapely.box(0, 0, paper.width, paper.height).covers(boxes)
+
+
+def test_long_tables_go_on_to_further_pages():
+    pages, _ = pages_of(nested(gores(150, 2, radius=60.0, page="A4", allowance=0.0)))
+    tables = [page for page in pages if page.content is None][1:]
+    assert len(tables) > 1
+    rows = [text.text for page in tables for text in page.drawing.texts]
+    assert rows.count("Seams") > 1
+    assert sum("and" in row for row in rows) == 150
+
+
+@pytest.mark.parametrize("page", ["roll:600mm", "none"])
+def test_a_roll_has_one_page_with_a_ruler_and_the_guide_last(page):
+    pages, _ = pages_of(nested(gores(12, 8, radius=100.0, page=page)))
+    assert pages[0].content is not None
+    assert [page.content is None for page in pages[1:]] == [True] * (len(pages) - 1)
+    assert (pages[-1].drawing.width, pages[-1].drawing.height) == PAGE_SIZES["A4"]
+    lengths = [np.ptp(line.points[:, 0]) for line in pages[0].drawing.lines]
+    assert 100 in lengths
+    if page != "none":
+        assert pages[0].drawing.width <= 600 + 1e-9
+
+
+def test_a_page_larger_than_a_pdf_allows_is_an_error():
+    outline = np.array([[0.0, 0], [6000, 0], [6000, 100], [0, 100]])
+    drawing = Drawing(6000.0, 100.0, (Line("cut", outline, is_closed=True),))
+    with pytest.raises(
+        OptionError, match="a page of 6000 x 100 mm is larger than the 5080 mm that a PDF allows"
+    ):
+        tiled(drawing, Paper.of("none"), "toy")
+    assert len(tiled(drawing, Paper.of("A4"), "toy")) == 34
+
+
+def test_a_pattern_of_one_page_has_no_marks_for_joining():
+    pages, _ = pages_of(nested(two_pieces(page="A3")))
+    assert [text.text for text in pages[-1].drawing.texts] == ["toy"]
+    assert not pages[-1].drawing.lines
