@@ -61,17 +61,18 @@ class Seam:
 
     @property
     def is_dart(self) -> bool:
-        """Whether the sides meet at an end, the tip of a dart."""
+        """Whether the sides meet at one end, the tip of a dart."""
         return self.tip is not None
 
     @cached_property
     def tip(self) -> int | None:
-        """The point at the tip of a dart; None if the seam is no dart."""
+        """The point at the tip of a dart; None if the seam is no dart.
+
+        Sides that meet at both ends close a piece like a ball, or leave a slit inside of it.
+        """
         first, second = self.sides
-        for end in (-1, 0):
-            if first.points[end] == second.points[-1 - end]:
-                return int(first.points[end])
-        return None
+        tips = [int(first.points[end]) for end in (-1, 0) if first.points[end] == second.points[-1 - end]]
+        return tips[0] if len(tips) == 1 else None
 
 
 @dataclass(frozen=True, eq=False)

@@ -60,7 +60,7 @@ def cloth_pieces(model: Model, options: PatternOptions) -> Development:
             )
     surface = cut_cloth(replace(model, mesh=mesh), stretch)
     with part_of_work(SMOOTHING_SHARE, "smooth seams"):
-        smooth = slit_until_within(with_smooth_seams(surface, options.tolerance), stretch)
+        smooth = slit_until_within(with_smooth_seams(surface, options.tolerance, model.seams), stretch)
     if not excess(smooth, stretch).any() or excess(surface, stretch).any():
         surface = smooth
     required = np.empty((0, 2), dtype=np.int64) if model.seams is None else model.seams

@@ -30,8 +30,8 @@ def write_dxf(drawing: Drawing, path: Path) -> None:
     document, stream = dxf_of(drawing), StringIO()
     with _without_times():
         document.write(stream)
-    with atomic_write(path, "w") as file:
-        file.write(stream.getvalue())
+    with atomic_write(path, "wb") as file:
+        file.write(document.encode(stream.getvalue()))
 
 
 def dxf_of(drawing: Drawing) -> Any:

@@ -28,8 +28,8 @@ if TYPE_CHECKING:
 GAP = 3.0
 # Random changes of the plan of a sheet that are tried, for all its widths together.
 TRIES = 150
-# Widest cell of the grid on which pieces are placed, mm, and smallest number of cells across a sheet.
-CELL, MIN_COLUMNS = 1.0, 400
+# Cell of the grid on which pieces are placed, mm, and the smallest and the largest number of cells across a sheet.
+CELL, MIN_COLUMNS, MAX_COLUMNS = 1.0, 400, 1_200
 # Widths of a sheet without a given one, relative to the square root of the area of the pieces.
 WIDTHS = (1.1, 1.3, 1.6)
 # Columns of pages side by side that are tried, around those of a square sheet.
@@ -108,7 +108,7 @@ def _inset(packing: SheetPacking) -> SheetPacking:
 
 
 def _columns(width: float) -> int:
-    return max(MIN_COLUMNS, int(np.ceil(width / CELL)))
+    return int(np.clip(np.ceil(width / CELL), MIN_COLUMNS, MAX_COLUMNS))
 
 
 def _outlines(shapes: Sequence[PieceShape]) -> Outlines:
@@ -145,7 +145,7 @@ def _packed(pieces: _Pieces, shapes: Sequence[PieceShape], paper: Paper) -> Shee
             )
         return packing
     area = sum(shape.cut.area for shape in shapes)
-    widths = {max(factor * area**0.5, 1.01 * pieces.narrowest) for factor in WIDTHS}
+    widths = {max(factor * area**0.5, 1.01 * pieces.narrowest + 2 * EDGE) for factor in WIDTHS}
     return min(_strips(pieces, sorted(widths)), key=lambda strip: strip[0] * strip[1].height)[1]
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from ...errors import OptionError
-from ...options import Choice, Direction, Edges, Number, RunOptions, option
+from ...options import Choice, Direction, Edges, Number, RunOptions, declarations, option
 from .finish import Allowances
 from .papers import PaperName
 from .units import MILLIMETRES, Length, Percentage
@@ -15,6 +15,12 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
 KINDS = ("cloth", "net", "gores", "sheet")
+#: Options that only one kind has.
+OWN_OPTIONS = {
+    "cloth": ("strain", "stretch_warp", "stretch_weft", "darts", "seams", "tolerance"),
+    "net": ("tabs",),
+    "gores": ("gores",),
+}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,7 +71,19 @@ class PatternOptions(RunOptions):
     def __post_init__(self) -> None:
         if self.height is not None and (self.unit is not None or self.scale != 1.0):
             raise OptionError("height and unit or scale cannot be combined: leave out one of them")
-        if self.seams is not None and self.kind != "cloth":
-            raise OptionError(f"seams and kind {self.kind} cannot be combined: only cloth takes seams")
+        for name in _names_of_other_kinds(self.kind):
+            if _differs(getattr(self, name), declarations(PatternOptions)[name].default):
+                raise OptionError(f"{name} and kind {self.kind} cannot be combined: leave out one of them")
+        if self.kind == "net" and self.allowance and self.tabs:
+            raise OptionError("allowance and tabs of a net cannot be combined: give 0 as one of them")
         if self.lengths is not None:
             raise OptionError("lengths and patterns cannot be combined: leave out lengths")
+
+
+def _differs(value: object, default: object) -> bool:
+    return value is not default and (not isinstance(value, (str, int, float)) or value != default)
+
+
+def _names_of_other_kinds(kind: str) -> list[str]:
+    """Return the names of the options that a kind of patterns does not have."""
+    return [name for other_kind, names in OWN_OPTIONS.items() for name in names if kind != other_kind]

@@ -54,7 +54,7 @@ def report_of(pattern: Pattern) -> dict[str, Any]:
         "sheet_width": width,
         "sheet_height": height,
         "sheet_share": float(sum(shape.area for shape in cut)) / (width * height),
-        "pages": len(tiles_of(cut, width, height, paper)),
+        "pages": len(tiles_of(cut, width, height, paper)) if paper.height is not None else 1,
         "millimetres_per_unit": pattern.millimetres,
         "each_piece": [
             {"number": i + 1, "width": piece_width, "height": piece_height, "area": piece_area}

@@ -21,8 +21,8 @@ MIN_AREA = 0.2
 MIN_COSINE = 0.8
 
 
-def with_smooth_seams(surface: CutSurface, tolerance: float) -> CutSurface:
-    """Return a cut surface whose seams are smoother; ends, forks and the border of the mesh stay.
+def with_smooth_seams(surface: CutSurface, tolerance: float, required: IntArray | None = None) -> CutSurface:
+    """Return a cut surface whose seams are smoother; ends, forks, the border and required seams stay.
 
     The vertices of seams slide along the surface, so the two sides of a seam remain equal. Triangles keep their places
     in the plane, and must be laid out again.
@@ -31,12 +31,15 @@ def with_smooth_seams(surface: CutSurface, tolerance: float) -> CutSurface:
         surface: the surface.
         tolerance: largest distance between the surfaces before and after, measured at the vertices and at the middles
             of the edges of both.
+        required: (k, 2) the vertices of edges that stay where they are; None for none.
     """
     mesh = surface.mesh
     along = mesh.edges[surface.seams]
     is_border = mesh.is_boundary_vertex
     degree = np.bincount(along.ravel(), minlength=len(mesh.vertices))
     is_movable = (degree == 2) & ~is_border
+    if required is not None:
+        is_movable[required] = False
     if tolerance == 0 or not is_movable.any():
         return surface
     before, tree = mesh.vertices, TriangleTree(mesh.vertices, mesh.faces)

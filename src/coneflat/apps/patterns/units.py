@@ -80,18 +80,25 @@ def length_of(value: Any) -> float | None:
 
 
 def _fraction(value: Any) -> float | None:
+    """Return a fraction from a number below 1 or a text with a percentage; None if it is neither.
+
+    A number of 1 or more is most probably meant as a percentage.
+    """
     match = _PERCENT.fullmatch(value) if isinstance(value, str) else None
     try:
-        return float(match[1]) / 100 if match else float(value)
+        number = float(match[1]) / 100 if match else float(value)
     except (TypeError, ValueError):
         return None
+    return number if match or number < 1 else None
 
 
 def text_of_size(extents: Any) -> str:
     """Return an extent of three lengths in millimetres as a text, such as "120 x 80 x 60 mm"."""
-    longest = max(extents)
-    unit, factor = ("m", 1000.0) if longest >= 10_000 else ("mm", 1.0)
-    return " x ".join(f"{extent / factor:.3g}" for extent in extents) + f" {unit}"
+    unit, factor = ("m", 1000.0) if max(extents) >= 10_000 else ("mm", 1.0)
+    lengths = [extent / factor for extent in extents]
+    return (
+        " x ".join(f"{length:,.0f}" if length >= 100 else f"{length:.3g}" for length in lengths) + f" {unit}"
+    )
 
 
 def area_text(area: float) -> str:
