@@ -8,16 +8,10 @@ import shapes
 
 import coneflat
 from coneflat import TriangleMesh, measure
-from coneflat.measures import largest_of_sides, strain_of
 
 VERTICES, FACES = shapes.grid(6, 4)
 MESH = TriangleMesh(VERTICES, FACES)
 FLAT = VERTICES[FACES][..., :2]
-
-
-def strain(mesh, corner_uv):
-    chosen, inner = np.ones(len(mesh.faces), dtype=bool), np.zeros(mesh.faces.size, dtype=bool)
-    return strain_of(mesh.vertices, mesh.faces, corner_uv, chosen, inner)
 
 
 def by_definition(result):
@@ -49,9 +43,7 @@ def test_a_stretched_grid():
     """Lengths 2 and 1 are best scaled to 4/3 and 2/3."""
     d = measure(MESH, FLAT * [2, 1])
     assert d.strain_max == pytest.approx(1 / 3)
-    sides = strain(MESH, FLAT * [2, 1]).sides
-    assert np.abs(largest_of_sides(sides)) == pytest.approx(np.full(len(FACES), 1 / 3))
-    assert np.nanmin(sides) == pytest.approx(-1 / 3)
+    assert np.abs(d.strain) == pytest.approx(np.full(len(FACES), 1 / 3))
 
 
 def test_it_does_not_depend_on_scale_motion_or_numbering():
@@ -66,11 +58,32 @@ def test_it_does_not_depend_on_scale_motion_or_numbering():
         assert getattr(moved, name) == pytest.approx(getattr(expected, name), rel=1e-9)
 
 
-def test_sides_without_length_are_left_out():
-    sides = np.array([[np.nan, 0.1, -0.2], [np.nan, np.nan, np.nan]])
-    assert largest_of_sides(sides) == pytest.approx([-0.2, np.nan], nan_ok=True)
-    collapsed = MESH.moved_to(0 * VERTICES)
-    assert np.isnan(strain(collapsed, FLAT).largest)
+def test_of_each_triangle_the_side_that_changes_most_counts():
+    uv = FLAT * [2, 1]
+    uv[0] = FLAT[0]
+    uv[1] = 3 * FLAT[1]
+    d = measure(MESH, uv)  # lengths from 1 to 3, scaled to 1/2 and 3/2
+    assert d.strain_max == pytest.approx(0.5)
+    assert d.strain[:2] == pytest.approx([-0.5, 0.5])
+    assert np.abs(d.strain[2:]).max() == pytest.approx(0.5)
+
+
+def test_triangles_without_area_are_left_out():
+    points = VERTICES.copy()
+    points[FACES[0]] = points[FACES[0, 0]]
+    d = measure(TriangleMesh(points, FACES), FLAT)
+    assert np.isnan(d.strain[0])
+    assert np.isfinite(d.strain_max)
+    collapsed = measure(MESH.moved_to(0 * VERTICES), FLAT)
+    assert np.isnan([collapsed.strain_max, collapsed.strain_mean, *collapsed.strain]).all()
+
+
+def test_it_is_stored_in_archives(tmp_path):
+    result = coneflat.flatten(*shapes.torus())
+    stored = coneflat.read_flattening(result.save(tmp_path / "torus.npz")).distortion
+    assert np.array_equal(stored.strain, result.distortion.strain)
+    assert stored.strain_max == result.distortion.strain_max
+    assert np.abs(stored.strain).max() == pytest.approx(stored.strain_max)
 
 
 def test_a_requirement_takes_it():

@@ -14,11 +14,10 @@ from .report import (
     path_text,
 )
 from .requirements import REPORTED, Requirement, breaches, parse_requirements
-from .strain import largest_of_sides, strain_of
 
 __all__ = [
     "FIRST_ROWS", "MAP_MEASURES", "REPORTED", "Requirement", "Row", "SUMMARY_MEASURES", "angle_sum_errors", "as_rows",
-    "breaches", "largest_of_sides", "map_rows", "mean_qc", "measure", "measure_map", "number_text", "packing_row",
-    "parse_requirements", "path_text", "quantile", "strain_of", "sum_angles", "undefined_measures",
+    "breaches", "map_rows", "mean_qc", "measure", "measure_map", "number_text", "packing_row",
+    "parse_requirements", "path_text", "quantile", "sum_angles", "undefined_measures",
     "unmet_guarantees",
 ]  # fmt: skip

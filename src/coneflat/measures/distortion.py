@@ -36,6 +36,8 @@ class Distortion:
     Attributes:
         qc: (m,) QC of each triangle; NaN where the triangle is degenerate on the model or in the plane.
         log_area_scale: (m,) log of sqrt(UV area / area on the model); NaN for the same triangles.
+        strain: (m,) relative change of the length of the side that changes most, at the scale of `strain_max`; NaN for
+            triangles without area on the model.
         qc_mean, qc_p95, qc_max: mean, 95th percentile and maximum of the quasi-conformal distortion, the ratio of
             the singular values of a triangle's map.
         area_std: standard deviation of log sqrt(UV area / area on the model).
@@ -73,6 +75,7 @@ class Distortion:
 
     qc: FloatArray
     log_area_scale: FloatArray
+    strain: FloatArray
     qc_mean: float
     qc_p95: float
     qc_max: float
@@ -231,6 +234,7 @@ def measure_map(
     return Distortion(
         qc=qc,
         **_scale_measures(qc, area, uv_area, has_area & has_uv_area),
+        strain=strain.of_triangles,
         strain_max=strain.largest,
         strain_mean=strain.mean,
         degenerate=int((has_area & ~has_uv_area).sum()),

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 Row: TypeAlias = tuple[str, str, str]
 
 # Arrays with a value for each triangle, which reports do not contain.
-_PER_TRIANGLE = ("qc", "log_area_scale")
+_PER_TRIANGLE = ("qc", "log_area_scale", "strain")
 _MEASURES = [field for field in fields(Distortion) if field.name not in _PER_TRIANGLE]
 #: Measures of any map of a mesh to the plane.
 MAP_MEASURES = tuple(field.name for field in _MEASURES if field.default is MISSING)

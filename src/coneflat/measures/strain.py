@@ -15,14 +15,14 @@ class Strain(NamedTuple):
     """Relative changes of the lengths of edges, with the plane scaled so that the largest one is least.
 
     Attributes:
-        sides: (m, 3) those of the sides of each triangle, column i opposite corner i; NaN for sides without length
-            and for triangles without area on the model.
-        largest: the largest absolute value; NaN if no side has one.
-        mean: the mean absolute value, weighted by length; an edge inside a chart counts once, and so does each side of
-            a seam.
+        of_triangles: (m,) that of the side of each triangle that changes most; NaN for triangles without area on the
+            model.
+        largest: the largest absolute value; NaN if there is none.
+        mean: the mean absolute value of edges, weighted by length. An edge inside a chart counts once, and so does
+            each side of a seam.
     """
 
-    sides: FloatArray
+    of_triangles: FloatArray
     largest: float
     mean: float
 
@@ -44,15 +44,15 @@ def strain_of(
     is_known = np.isfinite(ratios)
     low, high = np.min(ratios, where=is_known, initial=np.inf), np.max(ratios, where=is_known, initial=0.0)
     if not high > 0:
-        return Strain(np.full(ratios.shape, np.nan), float("nan"), float("nan"))
+        return Strain(np.full(len(faces), np.nan), float("nan"), float("nan"))
     # The halves are added, so that large numbers do not overflow.
     sides = ratios / (low / 2 + high / 2) - 1
     weights = np.where(is_known, lengths * np.where(is_inner.reshape(-1, 3), 0.5, 1.0), 0.0)
     mean = float((weights * np.abs(np.where(is_known, sides, 0.0))).sum() / weights.sum())
-    return Strain(sides, float((high / 2 - low / 2) / (high / 2 + low / 2)), mean)
+    return Strain(_largest_of_sides(sides), float((high / 2 - low / 2) / (high / 2 + low / 2)), mean)
 
 
-def largest_of_sides(sides: FloatArray) -> FloatArray:
+def _largest_of_sides(sides: FloatArray) -> FloatArray:
     """Return (m,) of the numbers (m, 3) of the sides of each triangle the one of largest absolute value, or NaN."""
     amounts = np.where(np.isfinite(sides), np.abs(sides), -1.0)
     place = amounts.argmax(axis=1)[:, None]

@@ -15,7 +15,15 @@ from ....geometry import signed_double_areas
 from ....io import SplitMesh, cell_side, split_at_seams
 from ....mesh import end_corners, label_faces, point_seams
 from ..faults import fault_places, uv_faults
-from ..quantity import ColorScale, Quantity, Ranges, angle_defects, conformal_distortion, stretch
+from ..quantity import (
+    ColorScale,
+    Quantity,
+    Ranges,
+    angle_defects,
+    conformal_distortion,
+    largest_strain,
+    stretch,
+)
 
 if TYPE_CHECKING:
     from .... import Flattening
@@ -124,6 +132,7 @@ class Content:
         seams: number of seam edges.
         chart: (m,) the chart of each triangle, the largest first.
         qc, area: (m,) QC distortion, and scale relative to its mean; NaN where undefined.
+        strain: (m,) the largest relative change of the length of a side; NaN where undefined.
         curvature, flat: (v,) curvature of the model and of the flat metric, in units of pi; NaN on the boundary.
         cones: (c,) vertices of the cones.
         cone_curvatures: (c,) curvatures in radians.
@@ -148,6 +157,7 @@ class Content:
     chart: IntArray
     qc: FloatArray
     area: FloatArray
+    strain: FloatArray
     curvature: FloatArray
     flat: FloatArray
     cones: IntArray
@@ -244,7 +254,8 @@ def content_of(
     faults_drawn, uv = faults.bits[drawn.triangles], split.uv[drawn.points]
     flat_curvature = angle_defects(result, True, model.mesh)[model.vertices] / np.pi
     numbers = np.arange(len(result.vertices)) if result.vertex_origin is None else result.vertex_origin
-    scales = _scales(qc, scale, model.curvature)
+    strain = largest_strain(result)
+    scales = _scales(qc, scale, strain, model.curvature)
     if quantity is not None:
         colors = "diverging" if quantity.scale.low < 0 < quantity.scale.high else "sequential"
         scales = {"own": replace(quantity.scale, colors=colors), **scales}
@@ -262,6 +273,7 @@ def content_of(
         chart=chart[drawn.triangles],
         qc=qc.values[drawn.triangles],
         area=scale.values[drawn.triangles],
+        strain=strain.values[drawn.triangles],
         curvature=model.curvature[drawn.vertices],
         flat=flat_curvature[drawn.vertices],
         cones=np.searchsorted(drawn.vertices, cone),
@@ -334,13 +346,13 @@ def _drawn(
     return _Drawn(triangles, points, vertices, point_vertex.reshape(-1), faces.reshape(-1, 3), outline)
 
 
-def _scales(qc: Quantity, area: Quantity, curvature: FloatArray) -> dict[str, ColorScale]:
+def _scales(qc: Quantity, area: Quantity, strain: Quantity, curvature: FloatArray) -> dict[str, ColorScale]:
     """Return the colour scale of each quantity of a page; both curvatures have that of the model.
 
     The scale of curvatures has four decades on each side of zero, and contains almost all curvatures.
 
     Args:
-        qc, area: QC distortion and scale.
+        qc, area, strain: QC distortion, scale and strain.
         curvature: (v,) curvature of the model in units of pi.
     """
     amounts = np.abs(curvature[np.isfinite(curvature) & (curvature != 0)])
@@ -354,6 +366,7 @@ def _scales(qc: Quantity, area: Quantity, curvature: FloatArray) -> dict[str, Co
     return {
         "qc": replace(qc.scale, colors="sequential"),
         "area": replace(area.scale, colors="diverging"),
+        "strain": strain.scale,
         "curvature": bent,
         "flat": bent,
     }

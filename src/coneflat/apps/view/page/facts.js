@@ -30,7 +30,7 @@ function factsOf(model, thing, show) {
 }
 
 function triangleFacts(model, index, show) {
-  const {qc, area, chart, faces, point_vertex} = model.arrays;
+  const {qc, area, strain, chart, faces, point_vertex} = model.arrays;
   const vertices = [0, 1, 2].map((k) => point_vertex[faces[3 * index + k]]);
   const facts = [`Triangle ${grouped(model.triangleNumber(index))}`];
   if (show === "own") {
@@ -39,6 +39,8 @@ function triangleFacts(model, index, show) {
   } else if (show === "curvature" || show === "flat") {
     const values = model.arrays[show];
     facts.push(`curvature at its corners ${vertices.map((v) => signed(values[v])).join(", ")}, in π`);
+  } else if (show === "strain") {
+    facts.push(`largest change of the length of a side ${Number.isFinite(strain[index]) ? `${signed(100 * strain[index], 2)}%` : "undefined"}`);
   } else if (show === "faults") {
     facts.push(model.faultsOf(index).map((name) => FAULT_NAMES[name]).join(", ") || "no fault");
   } else {

@@ -87,7 +87,7 @@ class Model {
 
   /** Return whether a colour map has a value for each triangle, not for each vertex. */
   isByFace(show) {
-    return show === "qc" || show === "area" || (show === "own" && this.head.own === "faces");
+    return show === "qc" || show === "area" || show === "strain" || (show === "own" && this.head.own === "faces");
   }
 
   /** Return the positions of the values of a colour map on its scale, for each triangle or each vertex. */

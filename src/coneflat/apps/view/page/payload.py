@@ -32,11 +32,12 @@ if TYPE_CHECKING:
 TITLES = {
     "qc": "QC distortion",
     "area": "Scale, relative to its mean",
+    "strain": "Strain: largest change of a side of a triangle",
     "curvature": "Curvature of the model, in π",
     "flat": "Curvature of the flat metric, in π",
 }
 #: Arrays that every page has, and their types.
-_KINDS = dict.fromkeys(("places", "uv", "qc", "area", "curvature", "flat"), "f4") | dict.fromkeys(
+_KINDS = dict.fromkeys(("places", "uv", "qc", "area", "strain", "curvature", "flat"), "f4") | dict.fromkeys(
     ("point_vertex", "faces", "outline", "cones"), "u4"
 )
 

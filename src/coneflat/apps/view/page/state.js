@@ -7,6 +7,7 @@ const SHOWS = [
   ["charts", "Charts"],
   ["qc", "QC distortion"],
   ["area", "Area scale"],
+  ["strain", "Strain"],
   ["faults", "UV faults"],
   ["curvature", "Curvature before"],
   ["flat", "Curvature after"],

@@ -55,8 +55,8 @@ def page_html(
         name: title of the page; by default the name of the file of the mesh.
         texture: image file for the model: PNG, JPEG, GIF or WebP.
         up: the model's upward axis in the first view, "x", "y" or "z"; "auto" is that of its format or shape.
-        show: display mode at the start: "checker", "picture", "charts", "qc", "area", "faults" (of the UVs),
-            "curvature" (of the model), "flat" (curvature of the flat metric), "plain" or, with `color`, "own"; by
+        show: display mode at the start: "checker", "picture", "charts", "qc", "area", "strain", "faults" (of the
+            UVs), "curvature" (of the model), "flat" (curvature of the flat metric), "plain" or, with `color`, "own"; by
             default the values of `color`, else the picture, else the checkerboard.
         color: quantity given by the user, or its name, see `own_quantity`.
         most_triangles: a mesh with more triangles is simplified for display.
