@@ -171,14 +171,15 @@ def stretch(result: Flattening, scale_max: float | None = None) -> Quantity:
     return Quantity("Scale", factor, areas, ColorScale(1 / top, top, "diverging", "log", ticks), ".3f")
 
 
-def largest_strain(result: Flattening) -> Quantity:
-    """Return the relative change of length of the side of every triangle that changes most; see `Distortion`."""
-    return strain_quantity(result.distortion.strain, _areas(result))
+def largest_strain(result: Flattening, strain: FloatArray | None = None) -> Quantity:
+    """Return the relative change of length of the side of every triangle that changes most.
 
-
-def strain_quantity(strain: FloatArray, areas: FloatArray) -> Quantity:
-    """Return relative changes of length (m,) in triangles of given areas as a quantity."""
-    is_known = np.isfinite(strain)
+    Args:
+        result: the flattening.
+        strain: (m,) the changes; by default those of its measures, see `Distortion`.
+    """
+    strain = result.distortion.strain if strain is None else strain
+    areas, is_known = _areas(result), np.isfinite(strain)
     reached = quantile(np.abs(strain[is_known]), areas[is_known], 0.95) if is_known.any() else 0.0
     top = next((limit for limit in STRAIN_ENDS if limit >= reached * (1 - 1e-9)), STRAIN_ENDS[-1])
     ticks = ((-top, f"\N{MINUS SIGN}{100 * top:.3g}%"), (0.0, "0"), (top, f"+{100 * top:.3g}%"))

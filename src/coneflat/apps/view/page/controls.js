@@ -165,6 +165,7 @@ class Controls {
       r: () => state.toggle("report"), d: () => state.toggle("dark"), "?": () => this.showHelp(),
       z: () => this.turnUp(),
       j: () => this.viewer.showNextFault(),
+      h: () => this.viewer.showNextSeam(),
       w: () => this.viewer.find({kind: "triangle", index: this.viewer.model.worstTriangle()}),
       Escape: () => state.set({picked: null, hovered: null, report: false}),
     };

@@ -76,6 +76,32 @@ class Model {
     return this.conePoints[thing.index].map((point) => [this.flatPlace(point)]);
   }
 
+  /** Return the edges of each seam. */
+  get seams() {
+    if (!this.seamEdges) {
+      this.seamEdges = [];
+      this.arrays.seam_numbers.forEach((seam, edge) => (this.seamEdges[seam] ??= []).push(edge));
+    }
+    return this.seamEdges;
+  }
+
+  /** Return the edges of the whole seam that a seam edge belongs to. */
+  edgesOfSeam(edge) {
+    return this.seams[this.arrays.seam_numbers[edge]];
+  }
+
+  /** Return the name of the seam of an edge; nothing if seams have no names. */
+  seamName(edge) {
+    return this.head.parts?.seam_names[this.arrays.seam_numbers[edge]];
+  }
+
+  /** Return of the edges of the seam of an edge the one nearest to their mean place on the model. */
+  middleOfSeam(edge) {
+    const edges = this.edgesOfSeam(edge), places = edges.map((index) => middleOf(this.shapeOf({kind: "seam", index}, false)[0]));
+    const mean = middleOf(places), off = places.map((place) => Math.hypot(...place.map((x, k) => x - mean[k])));
+    return edges[off.reduce((best, distance, i) => (distance < off[best] ? i : best), 0)];
+  }
+
   /** Return the index of a vertex, or of a triangle, in the mesh of the user. */
   vertexNumber(vertex) {
     return this.arrays.vertex_numbers ? this.arrays.vertex_numbers[vertex] : vertex;

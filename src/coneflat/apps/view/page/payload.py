@@ -25,6 +25,7 @@ from ..palettes import PALETTES, color_table
 from ..quantity import ColorScale
 from ..upward import axis_of
 from .content import Content
+from .parts import PageParts
 
 if TYPE_CHECKING:
     from .... import Flattening
@@ -38,7 +39,7 @@ TITLES = {
 }
 #: Arrays that every page has, and their types.
 _KINDS = dict.fromkeys(("places", "uv", "qc", "area", "strain", "curvature", "flat"), "f4") | dict.fromkeys(
-    ("point_vertex", "faces", "outline", "cones"), "u4"
+    ("point_vertex", "faces", "outline", "seam_numbers", "anchors", "cones"), "u4"
 )
 
 
@@ -82,11 +83,12 @@ def head_and_block(
     text: PageText | None = None,
     *,
     own_uv: FloatArray | None = None,
+    parts: PageParts | None = None,
 ) -> tuple[dict[str, Any], bytes]:
     """Return the numbers and texts of a page, and its arrays as a block of bytes.
 
     text: title and rows; by default those of a flattening. own_uv: (k, 2) UVs of the picture at the polygon corners of
-    the file; None if they are those of the layout.
+    the file; None if they are those of the layout. parts: names of pieces and seams.
 
     Raises:
         OptionError: `up` is not valid.
@@ -98,6 +100,7 @@ def head_and_block(
     if own_uv is not None and result.face_corners is not None:
         arrays["own_uv"] = own_uv[result.face_corners[content.face_numbers]].astype("f4")
     titles = TITLES if quantity is None else {**TITLES, "own": quantity.label}
+    titles = titles if parts is None else {**titles, "strain": parts.strain_title}
     listed, block = pack(arrays)
     head = {
         "name": name,
@@ -125,6 +128,9 @@ def head_and_block(
         "picture": None if picture is None else picture.kind,
         "show": show,
         "from_file": is_from_file(result),
+        "parts": None
+        if parts is None
+        else {"seam_names": list(parts.seam_names), "seam_texts": list(parts.seam_texts)},
         "arrays": listed,
     }
     return head, block
