@@ -11,12 +11,15 @@ from ...base import FloatArray, IntArray, plural
 from ...geometry import edge_lengths
 from ...measures import angle_sum_errors
 from ...stages import SolveStatistics
-from ..view import PageParts, PageText, outline_halfedges, page_html, seam_numbers
+from ..view import PageParts, PageText, page_html
 from .allowances import polygon_of, shapely
 from .borders import Seam
 from .report import rows_of
 from .result import Pattern
 from .shapes import tails
+
+# Strain up to which a pattern is as exact as numbers are.
+EXACT = 1e-6
 
 
 def page_of_pattern(pattern: Pattern, *, name: str = "Pattern", show: str = "charts", **look: Any) -> str:
@@ -25,7 +28,9 @@ def page_of_pattern(pattern: Pattern, *, name: str = "Pattern", show: str = "cha
     parts = [plural(pattern.piece_count, "piece"), plural(len(pattern.seams) - len(pattern.darts), "seam")]
     if pattern.is_sewn:
         parts.append(plural(len(pattern.darts), "dart"))
-    text = PageText(title="  ·  ".join([*parts, f"strain {100 * strain:.2g} %"]), rows=rows_of(pattern))
+    if strain > EXACT:
+        parts.append(f"strain {100 * strain:.2g} %")
+    text = PageText(title="  ·  ".join(parts), rows=rows_of(pattern))
     return page_html(as_flattening(pattern), name=name, show=show, text=text, parts=parts_of(pattern), **look)
 
 
@@ -67,19 +72,16 @@ def as_flattening(pattern: Pattern) -> Flattening:
 def parts_of(pattern: Pattern) -> PageParts:
     """Return what a page shows of the pieces and the seams of a pattern."""
     surface = pattern.surface
-    outline, seam_edges = outline_halfedges(surface.mesh, surface.corners)
-    numbers = seam_numbers(outline, seam_edges, surface.corners)
-    number_of_halfedge = dict(
-        zip(outline[: 2 * seam_edges].tolist(), np.repeat(numbers, 2).tolist(), strict=True)
-    )
-    by_number = {number_of_halfedge[int(seam.sides[0].halfedges[0])]: seam for seam in pattern.seams}
-    seams = [by_number[number] for number in range(len(by_number))]
+    seam_of_edge = np.empty(len(surface.mesh.edges), dtype=np.int64)
+    for number, seam in enumerate(pattern.seams):
+        seam_of_edge[surface.mesh.halfedge_edges[seam.sides[0].halfedges]] = number
     darts = {seam.name for seam in pattern.darts}
     return PageParts(
         pieces=surface.pieces,
         anchors=_anchors(pattern),
-        seam_names=[seam.name for seam in seams],
-        seam_texts=[_seam_text(seam, seam.name in darts) for seam in seams],
+        seams=seam_of_edge[surface.seams],
+        seam_names=[seam.name for seam in pattern.seams],
+        seam_texts=[_seam_text(seam, seam.name in darts) for seam in pattern.seams],
         strain=_strains(pattern),
         strain_title="Strain: largest change of a side of a triangle, at true scale",
     )

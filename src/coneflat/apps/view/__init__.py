@@ -13,7 +13,7 @@ from .figures.render import Barycentrics
 from .figures.uv_layout import draw_layout, fill_layout, layout_aspect
 from .from_uv import own_flattening, shown_rows, uv_flattening
 from .page.content import Model, content_of, outline_halfedges
-from .page.parts import PageParts, seam_numbers
+from .page.parts import PageParts
 from .page.payload import PageText, head_and_block, pack, text_of
 from .page.webpage import (
     check_page,
@@ -34,6 +34,6 @@ __all__ = [
     "conformal_distortion", "content_of", "demo_figure", "draw_checker", "draw_cones", "draw_layout", "draw_quantity",
     "eye_direction", "fill_layout", "head_and_block", "layout_aspect", "make_figure", "mark_handles", "mark_scale",
     "new_figure", "notebook_html", "open_address", "open_page", "outline_halfedges", "own_flattening", "own_quantity",
-    "pack", "page_around", "page_html", "page_of_quads", "save_figure", "seam_numbers", "show_mesh", "shown_rows",
+    "pack", "page_around", "page_html", "page_of_quads", "save_figure", "show_mesh", "shown_rows",
     "text_of", "upward_axis", "uv_faults", "uv_flattening", "view_aspect", "write_figure", "write_page",
 ]  # fmt: skip

@@ -277,7 +277,7 @@ def content_of(
         faces=drawn.faces,
         outline=drawn.outline,
         seams=seams,
-        seam_numbers=seam_numbers(outline, seams, split.faces),
+        seam_numbers=seam_numbers(outline, seams, split.faces) if parts is None else parts.seams,
         chart=chart[drawn.triangles],
         anchors=_nearest_drawn(parts, split, drawn.triangles),
         qc=qc.values[drawn.triangles],

@@ -3,6 +3,7 @@
 const RING = 11, CONE_RING = 15; // Radii in pixels; that of cones leaves the corners of their squares free.
 const RING_SIZE = 14; // Pixels; smaller things are marked by a ring.
 const IN_FRONT = 0.03; // Model radii; a triangle hides a thing if it is nearer by at least this distance.
+const NAME_OFFSET = 20; // Distance in pixels of the name of a seam from it, more than a ring.
 const NUMBER_INK = "#15181c", FONT = "600 14px system-ui, sans-serif";
 const UNSEEN = "rgba(0, 0, 0, 0.01)";
 
@@ -93,31 +94,36 @@ class Marks {
     pen.setLineDash([]);
   }
 
-  /** Write the name of the seam of an edge, if it has one, in the middle of each of its sides. */
+  /** Write the name of the seam of an edge, if it has one, beside the middle of each of its sides. */
   drawSeamName(pen, pane, state, edge, ink) {
     const name = this.model.seamName(edge);
     if (!name) return;
     const middle = {kind: "seam", index: this.model.middleOfSeam(edge)};
-    if (this.wasSeen(pane, middle, state)) this.write(pen, pane, name, middle, ink);
+    if (!this.wasSeen(pane, middle, state)) return;
+    this.model.shapeOf(middle, pane.inPlane).forEach((ends, side) => {
+      const [x, y] = middleOf(ends.map((end) => pane.camera.project(end)));
+      const [inner, down] = pane.camera.project(this.model.oppositePlace(2 * middle.index + side, pane.inPlane));
+      const far = NAME_OFFSET / (Math.hypot(inner - x, down - y) || 1);
+      this.write(pen, name, [x + far * (inner - x), y + far * (down - y)], ink);
+    });
   }
 
   /** Write the numbers of pieces, if there are pieces. */
   drawNumbers(pen, pane, state) {
     this.model.arrays.anchors.forEach((index, piece) => {
       const triangle = {kind: "triangle", index};
-      if (this.wasSeen(pane, triangle, state)) this.write(pen, pane, String(piece + 1), triangle, NUMBER_INK);
+      if (!this.wasSeen(pane, triangle, state)) return;
+      const corners = this.model.shapeOf(triangle, pane.inPlane)[0].map((corner) => pane.camera.project(corner));
+      this.write(pen, String(piece + 1), middleOf(corners), NUMBER_INK);
     });
   }
 
-  /** Write a text in the middle of a thing. */
-  write(pen, pane, text, thing, ink) {
+  /** Write a text with a halo around a place in pixels. */
+  write(pen, text, [x, y], ink) {
     Object.assign(pen, {font: FONT, textAlign: "center", textBaseline: "middle", lineJoin: "round"});
     Object.assign(pen, {strokeStyle: "#ffffff", lineWidth: 5, fillStyle: ink});
-    for (const ends of this.model.shapeOf(thing, pane.inPlane)) {
-      const [x, y] = middleOf(ends.map((end) => pane.camera.project(end)));
-      pen.strokeText(text, x, y);
-      pen.fillText(text, x, y);
-    }
+    pen.strokeText(text, x, y);
+    pen.fillText(text, x, y);
   }
 
   drawThing(pen, pane, state, thing, ink, strong) {

@@ -64,6 +64,12 @@ class Model {
     return [base + ((halfedge + 1 - base) % 3), base + ((halfedge + 2 - base) % 3)];
   }
 
+  /** Return the place of the corner opposite the i-th half-edge on the outlines of charts, in space or in the layout. */
+  oppositePlace(i, inPlane) {
+    const corner = this.arrays.outline[i];
+    return inPlane ? this.flatPlace(this.arrays.faces[corner]) : this.place(this.vertexAt(corner));
+  }
+
   /** Return the polygons or segments of a thing, in space or in the layout, as lists of points. */
   shapeOf(thing, inPlane) {
     const at = (corner) => (inPlane ? this.flatPlace(this.arrays.faces[corner]) : this.place(this.vertexAt(corner)));

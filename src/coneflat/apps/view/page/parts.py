@@ -20,7 +20,8 @@ class PageParts:
     Attributes:
         pieces: (m,) the piece of each triangle, from 0; their numbers on the page begin with 1.
         anchors: of each piece, a triangle in the middle, on which its number is shown.
-        seam_names: the name of each seam, in the order of `seam_numbers`.
+        seams: (k,) the seam of each seam edge, in the order of the edges of the mesh.
+        seam_names: the name of each seam.
         seam_texts: what is said of each seam, such as its length.
         strain: (m,) relative change of the length of the side of each triangle that changes most, at true scale.
         strain_title: what these are, for the colour scale.
@@ -28,6 +29,7 @@ class PageParts:
 
     pieces: IntArray
     anchors: IntArray
+    seams: IntArray
     seam_names: Sequence[str]
     seam_texts: Sequence[str]
     strain: FloatArray
