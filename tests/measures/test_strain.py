@@ -15,7 +15,7 @@ FLAT = VERTICES[FACES][..., :2]
 
 
 def by_definition(result):
-    """The largest and the mean change of length of the edges of the charts, at the best of many scales."""
+    """The largest change of length of the edges of the charts, at the best of many scales, and the mean."""
     lengths = {}
     for corners, points in zip(result.faces.tolist(), result.uv_faces.tolist(), strict=True):
         for i in range(3):
@@ -25,9 +25,9 @@ def by_definition(result):
     on_model, in_plane = np.array(list(lengths.values())).T
     ratios = in_plane / on_model
     scales = 1 / np.linspace(ratios.min(), ratios.max(), 20001)
-    best = scales[np.argmin([np.abs(scale * ratios - 1).max() for scale in scales])]
-    strains = np.abs(best * ratios - 1)
-    return strains.max(), np.average(strains, weights=on_model)
+    largest = min(np.abs(scale * ratios - 1).max() for scale in scales)
+    mean_scale = on_model.sum() / in_plane.sum()
+    return largest, np.average(np.abs(mean_scale * ratios - 1), weights=on_model)
 
 
 @pytest.mark.parametrize("shape", [shapes.torus, lambda: shapes.hill(10, 8)])
@@ -35,7 +35,7 @@ def test_it_is_that_of_the_definition(shape):
     result = coneflat.flatten(*shape(), distortion=0.2)
     largest, mean = by_definition(result)
     assert result.distortion.strain_max == pytest.approx(largest, abs=1e-3)
-    assert result.distortion.strain_mean == pytest.approx(mean, abs=1e-3)
+    assert result.distortion.strain_mean == pytest.approx(mean, rel=1e-9)
     assert result.report()["strain_max"] == result.distortion.strain_max
 
 
@@ -43,7 +43,8 @@ def test_a_stretched_grid():
     """Lengths 2 and 1 are best scaled to 4/3 and 2/3."""
     d = measure(MESH, FLAT * [2, 1])
     assert d.strain_max == pytest.approx(1 / 3)
-    assert np.abs(d.strain) == pytest.approx(np.full(len(FACES), 1 / 3))
+    assert np.ptp(d.strain) == pytest.approx(0, abs=1e-12)
+    assert np.abs(d.strain[0]) > d.strain_max
 
 
 def test_it_does_not_depend_on_scale_motion_or_numbering():
@@ -62,10 +63,9 @@ def test_of_each_triangle_the_side_that_changes_most_counts():
     uv = FLAT * [2, 1]
     uv[0] = FLAT[0]
     uv[1] = 3 * FLAT[1]
-    d = measure(MESH, uv)  # lengths from 1 to 3, scaled to 1/2 and 3/2
+    d = measure(MESH, uv)  # lengths from 1 to 3, scaled to 1/2 and 3/2 for the largest
     assert d.strain_max == pytest.approx(0.5)
-    assert d.strain[:2] == pytest.approx([-0.5, 0.5])
-    assert np.abs(d.strain[2:]).max() == pytest.approx(0.5)
+    assert (d.strain[1] + 1) / (d.strain[0] + 1) == pytest.approx(3)
 
 
 def test_triangles_without_area_are_left_out():
@@ -83,7 +83,6 @@ def test_it_is_stored_in_archives(tmp_path):
     stored = coneflat.read_flattening(result.save(tmp_path / "torus.npz")).distortion
     assert np.array_equal(stored.strain, result.distortion.strain)
     assert stored.strain_max == result.distortion.strain_max
-    assert np.abs(stored.strain).max() == pytest.approx(stored.strain_max)
 
 
 def test_a_requirement_takes_it():

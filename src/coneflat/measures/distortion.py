@@ -36,15 +36,15 @@ class Distortion:
     Attributes:
         qc: (m,) QC of each triangle; NaN where the triangle is degenerate on the model or in the plane.
         log_area_scale: (m,) log of sqrt(UV area / area on the model); NaN for the same triangles.
-        strain: (m,) relative change of the length of the side that changes most, at the scale of `strain_max`; NaN for
+        strain: (m,) relative change of the length of the side that changes most, at the scale of `strain_mean`; NaN for
             triangles without area on the model.
         qc_mean, qc_p95, qc_max: mean, 95th percentile and maximum of the quasi-conformal distortion, the ratio of
             the singular values of a triangle's map.
         area_std: standard deviation of log sqrt(UV area / area on the model).
         energy: symmetric Dirichlet energy, the sum of the squares of both singular values and of their inverses,
             averaged by area, at the scale where it is least; 4 for an isometry. Orientation does not count.
-        strain_max, strain_mean: relative change of the lengths of edges, at the scale where the largest one is least:
-            largest; mean, weighted by length. Both sides of a seam count.
+        strain_max, strain_mean: relative change of the lengths of edges: largest, at the scale where it is least; mean,
+            weighted by length, at the scale that keeps the total length. Both sides of a seam count.
         flipped: number of triangles whose orientation is opposite to that of their chart.
         degenerate, degenerate_input: number of triangles without area in the plane that have area on the model; number
             of triangles without area on the model.

@@ -12,19 +12,22 @@ from ..base.jit import compiled
 
 
 class Strain(NamedTuple):
-    """Relative changes of the lengths of edges, with the plane scaled so that the largest one is least.
+    """Relative changes of the lengths of edges.
 
     Attributes:
-        of_triangles: (m,) that of the side of each triangle that changes most; NaN for triangles without area on the
-            model.
-        largest: the largest absolute value; NaN if there is none.
-        mean: the mean absolute value of edges, weighted by length. An edge inside a chart counts once, and so does
-            each side of a seam.
+        of_triangles: (m,) that of the side of each triangle that changes most, at the scale that keeps the total length
+            of all edges; NaN for triangles without area on the model.
+        mean: the mean absolute value of edges at this scale, weighted by length.
+        largest: the largest absolute value, at the scale where it is least.
+
+    Notes:
+        An edge inside a chart counts once, and so does each side of a seam. The scale of the largest one is that of the
+        two extremes; where few edges are far off, all others would seem to be strained at it.
     """
 
     of_triangles: FloatArray
-    largest: float
     mean: float
+    largest: float
 
 
 def strain_of(
@@ -42,14 +45,14 @@ def strain_of(
     lengths, ratios = side_ratios(vertices, faces, np.ascontiguousarray(corner_uv, dtype=np.float64))
     ratios[~is_chosen] = np.nan
     is_known = np.isfinite(ratios)
-    low, high = np.min(ratios, where=is_known, initial=np.inf), np.max(ratios, where=is_known, initial=0.0)
-    if not high > 0:
-        return Strain(np.full(len(faces), np.nan), float("nan"), float("nan"))
-    # The halves are added, so that large numbers do not overflow.
-    sides = ratios / (low / 2 + high / 2) - 1
     weights = np.where(is_known, lengths * np.where(is_inner.reshape(-1, 3), 0.5, 1.0), 0.0)
-    mean = float((weights * np.abs(np.where(is_known, sides, 0.0))).sum() / weights.sum())
-    return Strain(_largest_of_sides(sides), float((high / 2 - low / 2) / (high / 2 + low / 2)), mean)
+    mean_ratio = float(np.average(ratios[is_known], weights=weights[is_known])) if weights.any() else 0.0
+    if not mean_ratio > 0:
+        return Strain(np.full(len(faces), np.nan), float("nan"), float("nan"))
+    sides = ratios / mean_ratio - 1
+    mean = float(np.average(np.abs(sides[is_known]), weights=weights[is_known]))
+    low, high = np.nanmin(sides) + 1, np.nanmax(sides) + 1
+    return Strain(_largest_of_sides(sides), mean, float((high - low) / (high + low)))
 
 
 def _largest_of_sides(sides: FloatArray) -> FloatArray:

@@ -17,6 +17,7 @@ from coneflat import Pattern
 from coneflat.apps.cli.main import cli
 from coneflat.apps.patterns import page_of_pattern
 from coneflat.apps.patterns.page import as_flattening, parts_of
+from coneflat.errors import UnknownFormatError
 
 pytest.importorskip("shapely")
 needs_browser = pytest.mark.skipif(browser_path() is None, reason="there is no Chromium here")
@@ -70,6 +71,13 @@ def test_names_of_seams():
     assert parts.seam_texts == ["Seam A, 80.0 mm eased to 72.0 mm"]
     assert parts_of(with_dart()).seam_texts[0].startswith("Dart A, ")
     assert parts_of(gores(8)).seam_names == list("ABCDEFGH")
+
+
+def test_a_pattern_is_viewed(tmp_path):
+    page = two_pieces().view(tmp_path / "toy.html")
+    assert page.read_text() == page_of_pattern(two_pieces())
+    with pytest.raises(UnknownFormatError, match="pages are written as"):
+        two_pieces().view(tmp_path / "toy.pdf")
 
 
 def test_the_command_writes_only_the_page_if_nothing_else_is_asked_for(tmp_path, monkeypatch):

@@ -77,14 +77,14 @@ def test_the_browser_has_the_numbers_of_the_result(visit, viewed):
         ("qc", content.qc), ("area", content.area), ("strain", content.strain), ("flat", content.flat),
     ):  # fmt: skip
         shown = np.array(visit.run(f"Array.from(coneflat.model.arrays.{name})"), dtype=float)
-        np.testing.assert_allclose(shown, values, rtol=1e-6, atol=1e-9)
+        np.testing.assert_allclose(shown, values, rtol=2**-10 if name == "strain" else 1e-6, atol=1e-9)
     values = {
         "qc": content.qc, "area": content.area, "strain": content.strain, "curvature": content.curvature,
     }  # fmt: skip
     for name, scale in content.scales.items():
         shown = np.array(visit.run(f"Array.from(coneflat.model.tones('{name}'))"))
         expected = np.nan_to_num(scale.position(values.get(name, content.flat)), nan=-1)
-        np.testing.assert_allclose(shown, expected, atol=1e-5)
+        np.testing.assert_allclose(shown, expected, atol=1e-3 if name == "strain" else 1e-5)
 
 
 def test_report_help_and_theme(visit, viewed):

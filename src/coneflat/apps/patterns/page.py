@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from os import PathLike
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,7 +13,7 @@ from ...base import FloatArray, IntArray, plural
 from ...geometry import edge_lengths
 from ...measures import angle_sum_errors
 from ...stages import SolveStatistics
-from ..view import PageParts, PageText, page_html
+from ..view import PageParts, PageText, check_page, open_page, page_html, write_page
 from .allowances import polygon_of, shapely
 from .borders import Seam
 from .report import rows_of
@@ -32,6 +34,16 @@ def page_of_pattern(pattern: Pattern, *, name: str = "Pattern", show: str = "cha
         parts.append(f"strain {100 * strain:.2g} %")
     text = PageText(title="  ·  ".join(parts), rows=rows_of(pattern))
     return page_html(as_flattening(pattern), name=name, show=show, text=text, parts=parts_of(pattern), **look)
+
+
+def show_pattern(pattern: Pattern, path: str | PathLike[str] | None) -> Path:
+    """Write the page of a pattern, and open it in the browser if no path is given; see `Pattern.view`."""
+    if path is not None:
+        check_page(path)
+    page = write_page(page_of_pattern(pattern), path)
+    if path is None:
+        open_page(page)
+    return page
 
 
 def as_flattening(pattern: Pattern) -> Flattening:
@@ -83,7 +95,7 @@ def parts_of(pattern: Pattern) -> PageParts:
         seam_names=[seam.name for seam in pattern.seams],
         seam_texts=[_seam_text(seam, seam.name in darts) for seam in pattern.seams],
         strain=_strains(pattern),
-        strain_title="Strain: largest change of a side of a triangle, at true scale",
+        strain_title="Strain: largest change of a side, at true scale",
     )
 
 

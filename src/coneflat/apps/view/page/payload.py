@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 TITLES = {
     "qc": "QC distortion",
     "area": "Scale, relative to its mean",
-    "strain": "Strain: largest change of a side of a triangle",
+    "strain": "Strain: largest change of a side, at the mean scale",
     "curvature": "Curvature of the model, in π",
     "flat": "Curvature of the flat metric, in π",
 }
@@ -169,6 +169,7 @@ def _arrays(content: Content) -> dict[str, NDArray[Any]]:
     arrays: dict[str, NDArray[Any]] = {
         name: np.asarray(getattr(content, name)).astype(kind) for name, kind in _KINDS.items()
     }
+    arrays["strain"] = _rounded(arrays["strain"])
     arrays["chart"] = content.chart.astype("u2" if content.chart.max() < 2**16 else "u4")
     arrays |= {name: np.round(255 * color_table(name)).astype(np.uint8) for name in PALETTES}
     arrays["faults"] = content.faults.astype("u1")
@@ -181,6 +182,12 @@ def _arrays(content: Content) -> dict[str, NDArray[Any]]:
     if content.left_out:
         arrays["face_numbers"] = content.face_numbers.astype("u4")
     return arrays
+
+
+def _rounded(values: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Return 32-bit numbers with a relative precision of 2^-10, which take half the space in a page."""
+    bits = values.view(np.uint32).astype(np.uint64) + 2**13
+    return (bits & 0xFFFFC000).astype(np.uint32).view(np.float32)
 
 
 def pack(arrays: Mapping[str, NDArray[Any]]) -> tuple[list[dict[str, Any]], bytes]:
