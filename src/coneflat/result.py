@@ -211,8 +211,8 @@ class Flattening:
             path: the page, .html; by default a new temporary file, which is opened in the browser.
             texture: a PNG, JPEG, GIF or WebP file to map onto the model.
             up: the model's upward axis in the first view, "x", "y" or "z"; "auto" is that of its format or shape.
-            show: what the colours show first: "checker", "picture", "charts", "qc", "area", "faults" (of the
-                UVs), "curvature" (of the model), "flat" (the remaining curvature) or "plain".
+            show: what the colours show first: "checker", "picture", "charts", "qc", "area", "strain",
+                "faults" (of the UVs), "curvature" (of the model), "flat" (the remaining curvature) or "plain".
             most_triangles: a mesh with more triangles is simplified for display; by default half a million.
             color: values to show first: the name of a vertex property in the mesh's file, or a file .npy or
                 FILE.npz:NAME with one number per vertex or triangle.

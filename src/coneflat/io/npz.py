@@ -32,7 +32,7 @@ _NAMES = (
     "vertex_origin", "face_origin", "qc", "log_area_scale", "uv_scale", "report",
 )  # fmt: skip
 #: Optional arrays: archives of version 0.1.0 do not have these, and only results for given lengths have lengths.
-_NEWER = ("prescribed", "lengths")
+_NEWER = ("prescribed", "strain", "lengths")
 
 
 def write_npz(result: Flattening, stream: IO[bytes]) -> None:
@@ -51,6 +51,7 @@ def write_npz(result: Flattening, stream: IO[bytes]) -> None:
         "vertex_origin": np.arange(len(result.vertices)) if origin is None else origin,
         "face_origin": np.arange(len(result.faces)) if result.face_origin is None else result.face_origin,
         "qc": result.distortion.qc,
+        "strain": result.distortion.strain,
         "uv_scale": np.float64(result.uv_scale),
         "report": np.array(json.dumps(result.report())),
     }
@@ -140,7 +141,9 @@ def _distortion(reading: CheckedArrays, report: dict[str, Any], triangles: int) 
     """Return the measures of an archive: those of its triangles, and those in its report."""
     measures: dict[str, Any] = {name: number(report.get(name)) for name in MEASURES}
     qc, log_area_scale = (reading.floats(name, (triangles,)) for name in ("qc", "log_area_scale"))
-    return Distortion(qc=qc, log_area_scale=log_area_scale, **measures)
+    has_strain = "strain" in reading.arrays  # Not so in files of old versions.
+    strain = reading.floats("strain", (triangles,)) if has_strain else np.full(triangles, np.nan)
+    return Distortion(qc=qc, log_area_scale=log_area_scale, strain=strain, **measures)
 
 
 def _statistics(report: dict[str, Any]) -> SolveStatistics:

@@ -17,6 +17,7 @@ from .requirements import REPORTED, Requirement, breaches, parse_requirements
 
 __all__ = [
     "FIRST_ROWS", "MAP_MEASURES", "REPORTED", "Requirement", "Row", "SUMMARY_MEASURES", "angle_sum_errors", "as_rows",
-    "breaches", "map_rows", "mean_qc", "measure", "measure_map", "number_text", "packing_row", "parse_requirements",
-    "path_text", "quantile", "sum_angles", "undefined_measures", "unmet_guarantees",
+    "breaches", "map_rows", "mean_qc", "measure", "measure_map", "number_text", "packing_row",
+    "parse_requirements", "path_text", "quantile", "sum_angles", "undefined_measures",
+    "unmet_guarantees",
 ]  # fmt: skip

@@ -21,6 +21,7 @@ from ..geometry.straight import place_triangles
 from ..mesh.charts import both_sides, joined_edges, label_charts
 from ..mesh.connectivity import TriangleMesh
 from ..stages import Layout
+from .strain import strain_of
 
 ZERO_AREA = 1e-12  # twice the area over the longest side squared; smaller ones are rounding errors
 
@@ -35,11 +36,15 @@ class Distortion:
     Attributes:
         qc: (m,) QC of each triangle; NaN where the triangle is degenerate on the model or in the plane.
         log_area_scale: (m,) log of sqrt(UV area / area on the model); NaN for the same triangles.
+        strain: (m,) relative change of the length of the side that changes most, at the scale of `strain_mean`; NaN for
+            triangles without area on the model.
         qc_mean, qc_p95, qc_max: mean, 95th percentile and maximum of the quasi-conformal distortion, the ratio of
             the singular values of a triangle's map.
         area_std: standard deviation of log sqrt(UV area / area on the model).
         energy: symmetric Dirichlet energy, the sum of the squares of both singular values and of their inverses,
             averaged by area, at the scale where it is least; 4 for an isometry. Orientation does not count.
+        strain_max, strain_mean: relative change of the lengths of edges: largest, at the scale where it is least; mean,
+            weighted by length, at the scale that keeps the total length. Both sides of a seam count.
         flipped: number of triangles whose orientation is opposite to that of their chart.
         degenerate, degenerate_input: number of triangles without area in the plane that have area on the model; number
             of triangles without area on the model.
@@ -64,17 +69,20 @@ class Distortion:
         >>> found = coneflat.flatten(vertices, faces).distortion
         >>> found.flipped, found.overlapping_pairs, found.charts
         (0, 0, 1)
-        >>> round(found.qc_mean, 6)  # a polyhedron opens without distortion
-        1.0
+        >>> round(found.qc_mean, 6), round(found.strain_max, 6)  # a polyhedron opens without distortion
+        (1.0, 0.0)
     """
 
     qc: FloatArray
     log_area_scale: FloatArray
+    strain: FloatArray
     qc_mean: float
     qc_p95: float
     qc_max: float
     area_std: float
     energy: float
+    strain_max: float
+    strain_mean: float
     flipped: int
     degenerate: int
     degenerate_input: int
@@ -222,9 +230,13 @@ def measure_map(
     if texture is not None:
         joined &= texture[mesh.edge_faces[:, 0]] == texture[mesh.edge_faces[:, 1]]
     seams = np.flatnonzero(~joined & ~mesh.is_boundary_edge)
+    strain = strain_of(*shapes, corner_uv, has_area, joined[mesh.halfedge_edges])
     return Distortion(
         qc=qc,
         **_scale_measures(qc, area, uv_area, has_area & has_uv_area),
+        strain=strain.of_triangles,
+        strain_max=strain.largest,
+        strain_mean=strain.mean,
         degenerate=int((has_area & ~has_uv_area).sum()),
         degenerate_input=int((~has_area).sum()),
         **_orientation_measures(mesh, joined, np.where(has_uv_area, uv_area, 0)),

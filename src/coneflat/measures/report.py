@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 Row: TypeAlias = tuple[str, str, str]
 
 # Arrays with a value for each triangle, which reports do not contain.
-_PER_TRIANGLE = ("qc", "log_area_scale")
+_PER_TRIANGLE = ("qc", "log_area_scale", "strain")
 _MEASURES = [field for field in fields(Distortion) if field.name not in _PER_TRIANGLE]
 #: Measures of any map of a mesh to the plane.
 MAP_MEASURES = tuple(field.name for field in _MEASURES if field.default is MISSING)
@@ -38,7 +38,8 @@ SUMMARY_MEASURES = (
 )  # fmt: skip
 #: The rows that commands always print, in this order; the others are printed if verbose.
 FIRST_ROWS = (
-    "charts", "overlap", "flipped", "texture", "texel density", "seam length", "QC distortion", "energy", "cones"
+    "charts", "overlap", "flipped", "texture", "texel density", "seam length", "QC distortion", "energy", "strain",
+    "cones",
 )  # fmt: skip
 
 
@@ -187,6 +188,12 @@ def map_rows(d: Distortion) -> dict[str, Row]:
             "energy",
             number_text(d.energy, ".4f"),
             "symmetric Dirichlet energy, averaged by area; 4 is an isometry",
+        ),
+        (
+            "strain",
+            f"{number_text(100 * d.strain_max, '.3g')} %",
+            "largest relative change of the length of an edge, at the scale where it is least; "
+            f"mean {number_text(100 * d.strain_mean, '.3g')} %",
         ),
         ("flipped", f"{d.flipped:,}", "triangles with orientation opposite to their chart"),
         (

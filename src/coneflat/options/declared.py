@@ -69,7 +69,7 @@ PAPER: Mapping[str, Any] = {"cones": "greedy", "max_cones": None, "method": "lin
 #: Largest number of triangles that the page draws. Larger meshes, which a browser rotates slowly, are simplified.
 MAX_SHOWN_TRIANGLES = 500_000
 #: What the page of the viewer can show first.
-SHOWS = ("checker", "picture", "charts", "qc", "area", "faults", "curvature", "flat", "plain")
+SHOWS = ("checker", "picture", "charts", "qc", "area", "strain", "faults", "curvature", "flat", "plain")
 
 
 @dataclass(frozen=True)

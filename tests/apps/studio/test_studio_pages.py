@@ -135,6 +135,7 @@ def test_the_page_switches_between_the_maps(visit, studio):
     assert [name for name in HIDDEN if page.is_visible(name)] == []
     assert page.input_value("#max-energy") == "4.1"
     assert "energy 4.0" in page.inner_text("#title")
+    assert "strain " in page.inner_text("#title")
     assert visit.cones() == []
     assert visit.run("[studio.tools.mode, coneflat.state.get('cones')]") == ["look", False]
 

@@ -13,6 +13,8 @@ _HOMES = {
     "Pattern": "result",
     "PatternOptions": "options",
     "check_pattern_output": "files",
+    "page_of_pattern": "page",
+    "rows_of": "report",
     "write_pattern": "files",
 }
 
@@ -23,13 +25,16 @@ __all__ = [
     "Pattern",
     "PatternOptions",
     "check_pattern_output",
+    "page_of_pattern",
+    "rows_of",
     "write_pattern",
 ]
 
 if TYPE_CHECKING:
     from .files import PATTERN_FORMATS, check_pattern_output, write_pattern
     from .options import KINDS, PatternOptions
-    from .report import PATTERN_MEASURES
+    from .page import page_of_pattern
+    from .report import PATTERN_MEASURES, rows_of
     from .result import Pattern
 
 

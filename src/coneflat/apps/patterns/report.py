@@ -66,6 +66,35 @@ def report_of(pattern: Pattern) -> dict[str, Any]:
     }
 
 
+def rows_of(pattern: Pattern, report: dict[str, Any] | None = None) -> list[tuple[str, str, str]]:
+    """Return the rows (measure, value, meaning) of the table of measures.
+
+    Args:
+        pattern: the pattern.
+        report: its report, if it has been computed already.
+    """
+    report = report_of(pattern) if report is None else report
+    eased = f"sides of {report['eased_seams']} differ, by {report['ease_max']:.1f} mm at most"
+    rows = [
+        ("pieces", f"{report['pieces']}", f"{report['area'] / 100:.0f} cm\u00b2 in total"),
+        (
+            "seams",
+            f"{report['seams'] - report['darts']}",
+            eased if report["eased_seams"] else "sides equally long",
+        ),
+        ("darts", f"{report['darts']}", "ends of seams inside a piece"),
+        ("seam length", f"{report['seam_length']:.0f} mm", "on the model, darts included"),
+        ("strain", f"{100 * report['strain_max']:.2g} %", "largest relative change of the length of an edge"),
+        (
+            "sheet",
+            f"{report['sheet_width']:.0f} x {report['sheet_height']:.0f} mm",
+            f"{100 * report['sheet_share']:.0f} % of it covered by pieces",
+        ),
+        ("pages", f"{report['pages']}", f"{pattern.settings.get('page', 'A4')}, without the assembly guide"),
+    ]
+    return rows if pattern.is_sewn else [row for row in rows if row[0] != "darts"]
+
+
 def piece_sizes(pattern: Pattern) -> list[tuple[float, float, float]]:
     """Return the width and the height of each piece without allowances, mm, and its area, mm^2."""
     surface, sizes = pattern.surface, []

@@ -21,6 +21,7 @@ from .shapes import Tab
 
 _DRAWING = EntryPoint[Drawing]("apps.patterns.outlines:drawing_of")
 _WRITE = EntryPoint[Path]("apps.patterns.files:write_pattern")
+_SHOW = EntryPoint[Path]("apps.patterns.page:show_pattern")
 _REPORT = EntryPoint[dict[str, Any]]("apps.patterns.report:report_of")
 
 
@@ -104,6 +105,21 @@ class Pattern:
             OptionError: options of the pattern cannot be met, or a package is not installed.
         """
         return _WRITE(self, path)
+
+    def view(self, path: str | PathLike[str] | None = None) -> Path:
+        """Write an interactive page, one self-contained HTML file, and return its path.
+
+        It shows the model next to its pieces, which have numbers and colours, both sides of each seam, the darts, and
+        the strain.
+
+        Args:
+            path: the page, .html; by default a new temporary file, which is opened in the browser.
+
+        Raises:
+            UnknownFormatError, MeshFileError: the file cannot be written.
+            OptionError: a package is not installed.
+        """
+        return _SHOW(self, path)
 
     def report(self) -> dict[str, Any]:
         """Return all measures as a dictionary that can be written as JSON; lengths in mm, areas in mm^2."""

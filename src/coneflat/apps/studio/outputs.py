@@ -286,7 +286,7 @@ def without_layout(checked: CheckedMesh) -> Flattening:
     # In a skew projection the triangles of boxes have areas, too, which a simplification for display needs.
     uv = mesh.vertices @ np.array([[0.92, 0.13], [0.31, 0.84], [0.23, 0.51]])
     ones = np.ones(len(mesh.faces))
-    unknown: Any = SimpleNamespace(qc=ones, log_area_scale=0 * ones, overlapping_pairs=0)
+    unknown: Any = SimpleNamespace(qc=ones, log_area_scale=0 * ones, strain=0 * ones, overlapping_pairs=0)
     return Flattening(
         mesh.vertices, mesh.faces, uv, mesh.faces, 1.0, none, zeros[:0], zeros, zeros, zeros, mesh.edges[:0], 0.0,
         unknown, {}, vertex_origin=checked.vertex_origin,

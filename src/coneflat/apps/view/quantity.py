@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 
 #: Least range of a colour scale of factors; a shorter one would show noise as distortion.
 MIN_RANGE = 0.05
+#: Ends of the colour scale of strains; the smallest one is below what can be measured on cloth or paper.
+STRAIN_ENDS = (0.001, 0.002, 0.005, 0.01, 0.02, 0.03, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0)
 #: Largest end of a colour scale; 32-bit numbers of pages have room for its square.
 MAX_END = 1e15
 
@@ -167,6 +169,21 @@ def stretch(result: Flattening, scale_max: float | None = None) -> Quantity:
     top = next((limit for limit in rounded if limit >= reached), reached) if scale_max is None else scale_max
     ticks = ((1 / top, f"{1 / top:.3g}"), (1.0, "1"), (top, f"{top:.3g}"))
     return Quantity("Scale", factor, areas, ColorScale(1 / top, top, "diverging", "log", ticks), ".3f")
+
+
+def largest_strain(result: Flattening, strain: FloatArray | None = None) -> Quantity:
+    """Return the relative change of length of the side of every triangle that changes most.
+
+    Args:
+        result: the flattening.
+        strain: (m,) the changes; by default those of its measures, see `Distortion`.
+    """
+    strain = result.distortion.strain if strain is None else strain
+    areas, is_known = _areas(result), np.isfinite(strain)
+    reached = quantile(np.abs(strain[is_known]), areas[is_known], 0.95) if is_known.any() else 0.0
+    top = next((limit for limit in STRAIN_ENDS if limit >= reached * (1 - 1e-9)), STRAIN_ENDS[-1])
+    ticks = ((-top, f"\N{MINUS SIGN}{100 * top:.3g}%"), (0.0, "0"), (top, f"+{100 * top:.3g}%"))
+    return Quantity("Strain", strain, areas, ColorScale(-top, top, "diverging", "linear", ticks), "+.2%")
 
 
 def curvature(result: Flattening, flat: bool) -> Quantity:

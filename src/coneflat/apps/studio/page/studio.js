@@ -135,14 +135,15 @@ class Studio {
     this.viewer.redraw();
   }
 
-  /** Add the charts, the packing, the overlap and the energy to the title; a preview does not have them. */
+  /** Add the charts, the packing, the overlap, the energy and the strain to the title; a preview does not have them. */
   showMeasures({rows}) {
     const values = new Map(rows.map(([name, value]) => [name, value])), charts = values.get("charts");
     if (!(Number(charts?.replaceAll(",", "")) > 0)) return;
     const more = [`${charts} ${charts === "1" ? "chart" : "charts"}`, `packing ${values.get("packing")}`, `overlap ${values.get("overlap")}`];
     const place = document.getElementById("title");
-    // On maps for textures the energy is shown instead of the cones.
-    const shown = place.textContent.split("  ·  ").flatMap((text) => (this.forTexture && / cones?$/.test(text) ? `energy ${values.get("energy")}` : text));
+    // On maps for textures the energy and the strain are shown instead of the cones.
+    const stretch = ["energy", "strain"].map((name) => `${name} ${values.get(name)}`);
+    const shown = place.textContent.split("  ·  ").flatMap((text) => (this.forTexture && / cones?$/.test(text) ? stretch : text));
     place.textContent = place.title = [...shown, ...more].join("  ·  ");
   }
 

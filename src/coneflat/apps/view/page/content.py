@@ -15,7 +15,16 @@ from ....geometry import signed_double_areas
 from ....io import SplitMesh, cell_side, split_at_seams
 from ....mesh import end_corners, label_faces, point_seams
 from ..faults import fault_places, uv_faults
-from ..quantity import ColorScale, Quantity, Ranges, angle_defects, conformal_distortion, stretch
+from ..quantity import (
+    ColorScale,
+    Quantity,
+    Ranges,
+    angle_defects,
+    conformal_distortion,
+    largest_strain,
+    stretch,
+)
+from .parts import PageParts, seam_numbers
 
 if TYPE_CHECKING:
     from .... import Flattening
@@ -122,8 +131,11 @@ class Content:
         outline: half-edges 3 f + i on the outlines of charts, each opposite corner i of face f: the two half-edges of
             each seam, one after the other, then those of the boundary.
         seams: number of seam edges.
-        chart: (m,) the chart of each triangle, the largest first.
+        seam_numbers: the seam of each seam edge, see `seam_numbers`.
+        chart: (m,) the chart of each triangle, the largest first; or its piece.
+        anchors: of each piece, a triangle on which its number is shown; empty without pieces.
         qc, area: (m,) QC distortion, and scale relative to its mean; NaN where undefined.
+        strain: (m,) the largest relative change of the length of a side; NaN where undefined.
         curvature, flat: (v,) curvature of the model and of the flat metric, in units of pi; NaN on the boundary.
         cones: (c,) vertices of the cones.
         cone_curvatures: (c,) curvatures in radians.
@@ -145,9 +157,12 @@ class Content:
     faces: IntArray
     outline: IntArray
     seams: int
+    seam_numbers: IntArray
     chart: IntArray
+    anchors: IntArray
     qc: FloatArray
     area: FloatArray
+    strain: FloatArray
     curvature: FloatArray
     flat: FloatArray
     cones: IntArray
@@ -211,6 +226,7 @@ def content_of(
     model: Model | None = None,
     quantity: Quantity | None = None,
     ranges: Ranges = FITTING,
+    parts: PageParts | None = None,
 ) -> Content:
     """Return the content of a page of a result.
 
@@ -220,6 +236,7 @@ def content_of(
         model: its surface, if it has been computed already.
         quantity: quantity given by the user.
         ranges: ends of the colour scales.
+        parts: pieces that are shown instead of charts.
 
     Raises:
         ArrayShapeError: the result has no UVs, or no triangles.
@@ -238,13 +255,14 @@ def content_of(
     cone = np.searchsorted(model.vertices, result.cones)
     outline, seams = outline_halfedges(model.mesh, split.faces)
     drawn = _drawn(split, model.places[vertex], vertex, cone, outline, max_triangles)
-    chart = _charts(split.faces, split.uv)
+    chart = _charts(split.faces, split.uv) if parts is None else parts.pieces
     qc, scale = conformal_distortion(result, ranges.qc_max), stretch(result, ranges.scale_max)
     faults = uv_faults(result)
     faults_drawn, uv = faults.bits[drawn.triangles], split.uv[drawn.points]
     flat_curvature = angle_defects(result, True, model.mesh)[model.vertices] / np.pi
     numbers = np.arange(len(result.vertices)) if result.vertex_origin is None else result.vertex_origin
-    scales = _scales(qc, scale, model.curvature)
+    strain = largest_strain(result, None if parts is None else parts.strain)
+    scales = _scales(qc, scale, strain, model.curvature)
     if quantity is not None:
         colors = "diverging" if quantity.scale.low < 0 < quantity.scale.high else "sequential"
         scales = {"own": replace(quantity.scale, colors=colors), **scales}
@@ -259,9 +277,12 @@ def content_of(
         faces=drawn.faces,
         outline=drawn.outline,
         seams=seams,
+        seam_numbers=seam_numbers(outline, seams, split.faces) if parts is None else parts.seams,
         chart=chart[drawn.triangles],
+        anchors=_nearest_drawn(parts, split, drawn.triangles),
         qc=qc.values[drawn.triangles],
         area=scale.values[drawn.triangles],
+        strain=strain.values[drawn.triangles],
         curvature=model.curvature[drawn.vertices],
         flat=flat_curvature[drawn.vertices],
         cones=np.searchsorted(drawn.vertices, cone),
@@ -275,6 +296,19 @@ def content_of(
         fault_places=fault_places(faults_drawn, uv, drawn.faces),
         fault_counts=faults.counts(),
     )
+
+
+def _nearest_drawn(parts: PageParts | None, split: SplitMesh, triangles: IntArray) -> IntArray:
+    """Return for the anchor of each piece the nearest triangle of the piece that is drawn."""
+    if parts is None:
+        return np.empty(0, dtype=np.int64)
+    middles = split.uv[split.faces].mean(axis=1)
+    nearest = []
+    for piece, anchor in enumerate(parts.anchors.tolist()):
+        candidates = np.flatnonzero(parts.pieces[triangles] == piece)
+        distances = np.linalg.norm(middles[triangles[candidates]] - middles[anchor], axis=1)
+        nearest.append(candidates[distances.argmin()])
+    return np.array(nearest)
 
 
 @dataclass(frozen=True, eq=False)
@@ -334,13 +368,13 @@ def _drawn(
     return _Drawn(triangles, points, vertices, point_vertex.reshape(-1), faces.reshape(-1, 3), outline)
 
 
-def _scales(qc: Quantity, area: Quantity, curvature: FloatArray) -> dict[str, ColorScale]:
+def _scales(qc: Quantity, area: Quantity, strain: Quantity, curvature: FloatArray) -> dict[str, ColorScale]:
     """Return the colour scale of each quantity of a page; both curvatures have that of the model.
 
     The scale of curvatures has four decades on each side of zero, and contains almost all curvatures.
 
     Args:
-        qc, area: QC distortion and scale.
+        qc, area, strain: QC distortion, scale and strain.
         curvature: (v,) curvature of the model in units of pi.
     """
     amounts = np.abs(curvature[np.isfinite(curvature) & (curvature != 0)])
@@ -354,6 +388,7 @@ def _scales(qc: Quantity, area: Quantity, curvature: FloatArray) -> dict[str, Co
     return {
         "qc": replace(qc.scale, colors="sequential"),
         "area": replace(area.scale, colors="diverging"),
+        "strain": strain.scale,
         "curvature": bent,
         "flat": bent,
     }

@@ -23,6 +23,7 @@ class Controls {
     this.part("title").textContent = this.part("title").title = head.title + thinned;
     this.part("show").replaceChildren(...showsOf(this.viewer.model).map(([key, name]) => new Option(name, key)));
     this.part("key-shows").textContent = `show: ${showsOf(this.viewer.model).slice(0, 9).map(([key, name], i) => `${i + 1} ${key === "own" ? name : name.toLowerCase()}`).join(", ")}`;
+    this.part("cones").textContent = head.parts ? "Darts" : "Cones";
     this.part("table").replaceChildren(...this.reportParts(head, shown));
     this.part("legend").replaceChildren(...this.legendParts(head));
   }
@@ -165,6 +166,7 @@ class Controls {
       r: () => state.toggle("report"), d: () => state.toggle("dark"), "?": () => this.showHelp(),
       z: () => this.turnUp(),
       j: () => this.viewer.showNextFault(),
+      h: () => this.viewer.showNextSeam(),
       w: () => this.viewer.find({kind: "triangle", index: this.viewer.model.worstTriangle()}),
       Escape: () => state.set({picked: null, hovered: null, report: false}),
     };

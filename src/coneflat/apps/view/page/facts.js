@@ -30,7 +30,7 @@ function factsOf(model, thing, show) {
 }
 
 function triangleFacts(model, index, show) {
-  const {qc, area, chart, faces, point_vertex} = model.arrays;
+  const {qc, area, strain, chart, faces, point_vertex} = model.arrays;
   const vertices = [0, 1, 2].map((k) => point_vertex[faces[3 * index + k]]);
   const facts = [`Triangle ${grouped(model.triangleNumber(index))}`];
   if (show === "own") {
@@ -39,13 +39,20 @@ function triangleFacts(model, index, show) {
   } else if (show === "curvature" || show === "flat") {
     const values = model.arrays[show];
     facts.push(`curvature at its corners ${vertices.map((v) => signed(values[v])).join(", ")}, in π`);
+  } else if (show === "strain") {
+    facts.push(`largest change of the length of a side ${Number.isFinite(strain[index]) ? `${signed(100 * strain[index], 2)}%` : "undefined"}`);
   } else if (show === "faults") {
     facts.push(model.faultsOf(index).map((name) => FAULT_NAMES[name]).join(", ") || "no fault");
   } else {
     facts.push(`QC ${measured(qc[index])}`, `scale ${measured(area[index], "×", 3)}`);
   }
-  facts.push(`chart ${chart[index] + 1}`, `vertices ${vertices.map((v) => grouped(model.vertexNumber(v))).join(", ")}`);
+  facts.push(`${partName(model)} ${chart[index] + 1}`, `vertices ${vertices.map((v) => grouped(model.vertexNumber(v))).join(", ")}`);
   return facts;
+}
+
+/** Return what charts are called. */
+function partName(model) {
+  return model.head.parts ? "piece" : "chart";
 }
 
 function seamFacts(model, index) {
@@ -53,15 +60,19 @@ function seamFacts(model, index) {
   const ends = model.outlineCorners(2 * index).map((corner) => grouped(model.vertexNumber(model.vertexAt(corner))));
   const off = Math.abs(lengths[0] - lengths[1]) / Math.max((lengths[0] + lengths[1]) / 2, 1e-30);
   const charts = [0, 1].map((side) => model.arrays.chart[Math.floor(model.arrays.outline[2 * index + side] / 3)] + 1);
-  const between = charts[0] === charts[1] ? `within chart ${charts[0]}` : `between charts ${charts[0]} and ${charts[1]}`;
+  const part = partName(model);
+  const between = charts[0] === charts[1] ? `within ${part} ${charts[0]}` : `between ${part}s ${charts[0]} and ${charts[1]}`;
   // The page has single precision, about seven digits.
   const equal = off < 1e-4 ? "both sides of equal length" : `lengths of the sides differ by ${(100 * off).toPrecision(2)}%`;
-  return [`Seam edge ${ends.join("–")}`, between, equal];
+  if (model.head.parts) return [model.head.parts.seam_texts[model.arrays.seam_numbers[index]], between, `edge ${ends.join("–")}`];
+  const count = model.edgesOfSeam(index).length;
+  return [`Seam edge ${ends.join("–")}`, count === 1 ? "a seam of one edge" : `a seam of ${grouped(count)} edges`, between, equal];
 }
 
 function coneFacts(model, index) {
   const curvature = (180 / Math.PI) * model.head.cone_curvatures[index];
   const points = model.conePoints[index].length;
+  if (model.head.parts) return [`Tip of a dart at vertex ${grouped(model.vertexNumber(model.arrays.cones[index]))}`, `opens by ${curvature.toFixed(1)}°`];
   return [
     `Cone at vertex ${grouped(model.vertexNumber(model.arrays.cones[index]))}`,
     `curvature ${signed(curvature, 1)}°`,

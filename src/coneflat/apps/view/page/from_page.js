@@ -10,7 +10,7 @@ async function startFromPage() {
     arrays.remove();
     const picture = head.picture ? await pictureOf(new Blob([model.arrays.picture], {type: head.picture})) : null;
     window.coneflat = new Viewer(model, picture);
-    window.coneflat.showUnitSquare();
+    if (!head.parts) window.coneflat.showUnitSquare();
     document.documentElement.dataset.ready = String(Math.round(performance.now()));
   } catch (error) {
     trouble(error.message);

@@ -244,6 +244,15 @@ class Viewer {
     if (picked) this.panes.forEach((pane) => this.bringIntoSight(pane, picked, this.zoomTo(pane, picked)));
   }
 
+  /** Pick the next seam, by the edge in its middle. */
+  showNextSeam() {
+    const {model, state} = this, {seam_numbers} = model.arrays, picked = state.get("picked");
+    if (!model.seamCount) return;
+    const next = picked?.kind === "seam" ? (seam_numbers[picked.index] + 1) % model.seams.length : 0;
+    state.set({seams: true});
+    this.find({kind: "seam", index: model.middleOfSeam(model.seams[next][0])});
+  }
+
   /** Return the zoom at which a thing is neither small nor large. */
   zoomTo(pane, thing) {
     const places = this.model.shapeOf(thing, pane.inPlane)[0];

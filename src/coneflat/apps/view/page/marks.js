@@ -3,6 +3,8 @@
 const RING = 11, CONE_RING = 15; // Radii in pixels; that of cones leaves the corners of their squares free.
 const RING_SIZE = 14; // Pixels; smaller things are marked by a ring.
 const IN_FRONT = 0.03; // Model radii; a triangle hides a thing if it is nearer by at least this distance.
+const NAME_OFFSET = 20; // Distance in pixels of the name of a seam from it, more than a ring.
+const NUMBER_INK = "#15181c", FONT = "600 14px system-ui, sans-serif";
 const UNSEEN = "rgba(0, 0, 0, 0.01)";
 
 class Marks {
@@ -28,7 +30,8 @@ class Marks {
     pen.fillStyle = UNSEEN; // Chromium may show the old content where nothing is drawn after clearing.
     pen.fillRect(0, 0, 1, 1);
     const [picked, hovered] = [state.get("picked"), state.get("hovered")];
-    if (!picked && !hovered) this.seen.clear();
+    if (settled) this.seen.clear();
+    const seams = [picked, hovered].filter((thing) => thing?.kind === "seam");
     for (const pane of panes) {
       pen.save();
       pen.beginPath();
@@ -36,8 +39,11 @@ class Marks {
       pen.clip();
       pen.translate(pane.left, pane.top);
       if (pane.inPlane && this.showsSquare) this.drawSquare(pen, pane);
-      if (picked) this.drawThing(pen, pane, state, picked, ink, true, settled);
-      if (hovered && !sameThing(hovered, picked)) this.drawThing(pen, pane, state, hovered, ink, false, settled);
+      for (const {index} of seams) this.drawSeam(pen, pane, state, index, ink);
+      if (picked) this.drawThing(pen, pane, state, picked, ink, true);
+      if (hovered && !sameThing(hovered, picked)) this.drawThing(pen, pane, state, hovered, ink, hovered.kind === "seam");
+      this.drawNumbers(pen, pane, state);
+      for (const {index} of seams) this.drawSeamName(pen, pane, state, index, ink);
       this.overlay?.(pen, pane);
       pen.restore();
     }
@@ -59,10 +65,69 @@ class Marks {
     pen.setLineDash([]);
   }
 
-  drawThing(pen, pane, state, thing, ink, strong, settled) {
+  /** Return whether a thing was visible when the view came to rest, or when it was first drawn after that. */
+  wasSeen(pane, thing, state) {
     const key = [pane.name, thing.kind, thing.index].join();
-    if (settled || !this.seen.has(key)) this.seen.set(key, this.isSeen(pane, thing, state));
-    const seen = this.seen.get(key);
+    if (!this.seen.has(key)) this.seen.set(key, this.isSeen(pane, thing, state));
+    return this.seen.get(key);
+  }
+
+  /** Draw the whole seam of an edge, both of its sides in the layout; dashed where it is hidden. */
+  drawSeam(pen, pane, state, edge, ink) {
+    const [seen, hidden] = [new Path2D(), new Path2D()];
+    for (const index of this.model.edgesOfSeam(edge)) {
+      const thing = {kind: "seam", index}, path = this.wasSeen(pane, thing, state) ? seen : hidden;
+      for (const [begin, end] of this.model.shapeOf(thing, pane.inPlane)) {
+        path.moveTo(...pane.camera.project(begin).slice(0, 2));
+        path.lineTo(...pane.camera.project(end).slice(0, 2));
+      }
+    }
+    pen.lineCap = "round";
+    for (const [path, dashes] of [[hidden, [2, 5]], [seen, []]]) {
+      pen.setLineDash(dashes);
+      for (const [style, width] of [["#ffffff", 5], [ink, 2.4]]) {
+        pen.strokeStyle = style;
+        pen.lineWidth = width;
+        pen.stroke(path);
+      }
+    }
+    pen.setLineDash([]);
+  }
+
+  /** Write the name of the seam of an edge, if it has one, beside the middle of each of its sides. */
+  drawSeamName(pen, pane, state, edge, ink) {
+    const name = this.model.seamName(edge);
+    if (!name) return;
+    const middle = {kind: "seam", index: this.model.middleOfSeam(edge)};
+    if (!this.wasSeen(pane, middle, state)) return;
+    this.model.shapeOf(middle, pane.inPlane).forEach((ends, side) => {
+      const [x, y] = middleOf(ends.map((end) => pane.camera.project(end)));
+      const [inner, down] = pane.camera.project(this.model.oppositePlace(2 * middle.index + side, pane.inPlane));
+      const far = NAME_OFFSET / (Math.hypot(inner - x, down - y) || 1);
+      this.write(pen, name, [x + far * (inner - x), y + far * (down - y)], ink);
+    });
+  }
+
+  /** Write the numbers of pieces, if there are pieces. */
+  drawNumbers(pen, pane, state) {
+    this.model.arrays.anchors.forEach((index, piece) => {
+      const triangle = {kind: "triangle", index};
+      if (!this.wasSeen(pane, triangle, state)) return;
+      const corners = this.model.shapeOf(triangle, pane.inPlane)[0].map((corner) => pane.camera.project(corner));
+      this.write(pen, String(piece + 1), middleOf(corners), NUMBER_INK);
+    });
+  }
+
+  /** Write a text with a halo around a place in pixels. */
+  write(pen, text, [x, y], ink) {
+    Object.assign(pen, {font: FONT, textAlign: "center", textBaseline: "middle", lineJoin: "round"});
+    Object.assign(pen, {strokeStyle: "#ffffff", lineWidth: 5, fillStyle: ink});
+    pen.strokeText(text, x, y);
+    pen.fillText(text, x, y);
+  }
+
+  drawThing(pen, pane, state, thing, ink, strong) {
+    const seen = this.wasSeen(pane, thing, state);
     for (const ends of this.model.shapeOf(thing, pane.inPlane)) {
       const places = ends.map((end) => pane.camera.project(end));
       const span = Math.max(...places.map(([x, y]) => Math.hypot(x - places[0][0], y - places[0][1])));
@@ -86,6 +151,7 @@ class Marks {
         pen.lineWidth = width;
         pen.stroke(path);
       }
+      pen.setLineDash([]);
     }
   }
 

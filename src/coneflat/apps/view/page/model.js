@@ -64,6 +64,12 @@ class Model {
     return [base + ((halfedge + 1 - base) % 3), base + ((halfedge + 2 - base) % 3)];
   }
 
+  /** Return the place of the corner opposite the i-th half-edge on the outlines of charts, in space or in the layout. */
+  oppositePlace(i, inPlane) {
+    const corner = this.arrays.outline[i];
+    return inPlane ? this.flatPlace(this.arrays.faces[corner]) : this.place(this.vertexAt(corner));
+  }
+
   /** Return the polygons or segments of a thing, in space or in the layout, as lists of points. */
   shapeOf(thing, inPlane) {
     const at = (corner) => (inPlane ? this.flatPlace(this.arrays.faces[corner]) : this.place(this.vertexAt(corner)));
@@ -74,6 +80,32 @@ class Model {
     }
     if (!inPlane) return [[this.place(this.arrays.cones[thing.index])]];
     return this.conePoints[thing.index].map((point) => [this.flatPlace(point)]);
+  }
+
+  /** Return the edges of each seam. */
+  get seams() {
+    if (!this.seamEdges) {
+      this.seamEdges = [];
+      this.arrays.seam_numbers.forEach((seam, edge) => (this.seamEdges[seam] ??= []).push(edge));
+    }
+    return this.seamEdges;
+  }
+
+  /** Return the edges of the whole seam that a seam edge belongs to. */
+  edgesOfSeam(edge) {
+    return this.seams[this.arrays.seam_numbers[edge]];
+  }
+
+  /** Return the name of the seam of an edge; nothing if seams have no names. */
+  seamName(edge) {
+    return this.head.parts?.seam_names[this.arrays.seam_numbers[edge]];
+  }
+
+  /** Return of the edges of the seam of an edge the one nearest to their mean place on the model. */
+  middleOfSeam(edge) {
+    const edges = this.edgesOfSeam(edge), places = edges.map((index) => middleOf(this.shapeOf({kind: "seam", index}, false)[0]));
+    const mean = middleOf(places), off = places.map((place) => Math.hypot(...place.map((x, k) => x - mean[k])));
+    return edges[off.reduce((best, distance, i) => (distance < off[best] ? i : best), 0)];
   }
 
   /** Return the index of a vertex, or of a triangle, in the mesh of the user. */
@@ -87,7 +119,7 @@ class Model {
 
   /** Return whether a colour map has a value for each triangle, not for each vertex. */
   isByFace(show) {
-    return show === "qc" || show === "area" || (show === "own" && this.head.own === "faces");
+    return show === "qc" || show === "area" || show === "strain" || (show === "own" && this.head.own === "faces");
   }
 
   /** Return the positions of the values of a colour map on its scale, for each triangle or each vertex. */

@@ -25,6 +25,7 @@ from ..palettes import PALETTES, color_table
 from ..quantity import ColorScale
 from ..upward import axis_of
 from .content import Content
+from .parts import PageParts
 
 if TYPE_CHECKING:
     from .... import Flattening
@@ -32,12 +33,13 @@ if TYPE_CHECKING:
 TITLES = {
     "qc": "QC distortion",
     "area": "Scale, relative to its mean",
+    "strain": "Strain: largest change of a side, at the mean scale",
     "curvature": "Curvature of the model, in π",
     "flat": "Curvature of the flat metric, in π",
 }
 #: Arrays that every page has, and their types.
-_KINDS = dict.fromkeys(("places", "uv", "qc", "area", "curvature", "flat"), "f4") | dict.fromkeys(
-    ("point_vertex", "faces", "outline", "cones"), "u4"
+_KINDS = dict.fromkeys(("places", "uv", "qc", "area", "strain", "curvature", "flat"), "f4") | dict.fromkeys(
+    ("point_vertex", "faces", "outline", "seam_numbers", "anchors", "cones"), "u4"
 )
 
 
@@ -81,11 +83,12 @@ def head_and_block(
     text: PageText | None = None,
     *,
     own_uv: FloatArray | None = None,
+    parts: PageParts | None = None,
 ) -> tuple[dict[str, Any], bytes]:
     """Return the numbers and texts of a page, and its arrays as a block of bytes.
 
     text: title and rows; by default those of a flattening. own_uv: (k, 2) UVs of the picture at the polygon corners of
-    the file; None if they are those of the layout.
+    the file; None if they are those of the layout. parts: names of pieces and seams.
 
     Raises:
         OptionError: `up` is not valid.
@@ -97,6 +100,7 @@ def head_and_block(
     if own_uv is not None and result.face_corners is not None:
         arrays["own_uv"] = own_uv[result.face_corners[content.face_numbers]].astype("f4")
     titles = TITLES if quantity is None else {**TITLES, "own": quantity.label}
+    titles = titles if parts is None else {**titles, "strain": parts.strain_title}
     listed, block = pack(arrays)
     head = {
         "name": name,
@@ -124,6 +128,9 @@ def head_and_block(
         "picture": None if picture is None else picture.kind,
         "show": show,
         "from_file": is_from_file(result),
+        "parts": None
+        if parts is None
+        else {"seam_names": list(parts.seam_names), "seam_texts": list(parts.seam_texts)},
         "arrays": listed,
     }
     return head, block
@@ -162,6 +169,7 @@ def _arrays(content: Content) -> dict[str, NDArray[Any]]:
     arrays: dict[str, NDArray[Any]] = {
         name: np.asarray(getattr(content, name)).astype(kind) for name, kind in _KINDS.items()
     }
+    arrays["strain"] = _rounded(arrays["strain"])
     arrays["chart"] = content.chart.astype("u2" if content.chart.max() < 2**16 else "u4")
     arrays |= {name: np.round(255 * color_table(name)).astype(np.uint8) for name in PALETTES}
     arrays["faults"] = content.faults.astype("u1")
@@ -174,6 +182,12 @@ def _arrays(content: Content) -> dict[str, NDArray[Any]]:
     if content.left_out:
         arrays["face_numbers"] = content.face_numbers.astype("u4")
     return arrays
+
+
+def _rounded(values: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Return 32-bit numbers with a relative precision of 2^-10, which take half the space in a page."""
+    bits = values.view(np.uint32).astype(np.uint64) + 2**13
+    return (bits & 0xFFFFC000).astype(np.uint32).view(np.float32)
 
 
 def pack(arrays: Mapping[str, NDArray[Any]]) -> tuple[list[dict[str, Any]], bytes]:

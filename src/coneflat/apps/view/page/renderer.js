@@ -256,17 +256,25 @@ class Renderer {
   pick(pane, x, y, state) {
     const gl = this.gl;
     if (gl.isContextLost() || x < 0 || y < 0 || x >= pane.width || y >= pane.height) return null;
-    const target = this.pickTargetOf(pane, state), bytes = new Uint8Array(4);
-    gl.bindFramebuffer(gl.FRAMEBUFFER, target.frame);
-    gl.readPixels(Math.floor(x), target.height - 1 - Math.floor(y), 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, bytes);
-    gl.bindFramebuffer(gl.FRAMEBUFFER, null);
-    let index = new DataView(bytes.buffer).getUint32(0, true) - 1;
+    const target = this.pickTargetOf(pane, state), [column, row] = [Math.floor(x), target.height - 1 - Math.floor(y)];
+    if (column >= target.width || row < 0) return null;
+    target.numbers ??= this.numbersIn(target);
+    let index = target.numbers[row * target.width + column] - 1;
     if (index < 0) return null;
     for (const [kind, count] of [["triangle", this.model.triangleCount], ["seam", this.model.seamCount]]) {
       if (index < count) return {kind, index};
       index -= count;
     }
     return {kind: "cone", index};
+  }
+
+  /** Return the numbers in an image of them: all at once, because many are asked for to see where a seam is visible. */
+  numbersIn({frame, width, height}) {
+    const gl = this.gl, bytes = new Uint8Array(4 * width * height);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, frame);
+    gl.readPixels(0, 0, width, height, gl.RGBA, gl.UNSIGNED_BYTE, bytes);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, null);
+    return new Uint32Array(bytes.buffer); // Machines with a browser are little-endian.
   }
 
   /** Return the image of thing numbers of a pane; it is drawn again only if the view has changed. */
@@ -277,6 +285,7 @@ class Renderer {
     const key = [pane.camera.version, state.get("seams"), state.get("cones"), this.shown === "faults"].join();
     if (target.key === key) return target;
     target.key = key;
+    target.numbers = null;
     target.begin([0, 0, 0, 0], [0, 0, ...size]);
     const view = this.viewOf(pane, 1), side = Number(pane.inPlane);
     this.pickPrograms.surface.use({...view, inPlane: pane.inPlane, layered: this.shown === "faults", plane: [...model.uvCentre, model.uvUnit]});

@@ -7,6 +7,7 @@ const SHOWS = [
   ["charts", "Charts"],
   ["qc", "QC distortion"],
   ["area", "Area scale"],
+  ["strain", "Strain"],
   ["faults", "UV faults"],
   ["curvature", "Curvature before"],
   ["flat", "Curvature after"],
@@ -16,8 +17,9 @@ const SHOWS = [
 
 /** Return the display modes of a model; values given by the user have their own name. */
 function showsOf(model) {
-  const own = model.head.scales.own;
-  return SHOWS.filter(([key]) => key !== "own" || own).map(([key, name]) => [key, key === "own" ? own.title : name]);
+  const {scales, parts} = model.head;
+  const names = {own: scales.own?.title, charts: parts ? "Pieces" : "Charts"};
+  return SHOWS.filter(([key]) => key !== "own" || scales.own).map(([key, name]) => [key, names[key] ?? name]);
 }
 
 /** Named values; listeners are called with the names that have changed. */

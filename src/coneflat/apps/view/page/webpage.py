@@ -19,6 +19,7 @@ from ....io import Texture, atomic_write, checked_target, read_picture
 from ....options import MAX_SHOWN_TRIANGLES, SHOWS, as_integer
 from ..quantity import Quantity, Ranges, own_quantity
 from .content import FITTING, content_of
+from .parts import PageParts
 from .payload import PageText, as_payload, head_and_block
 
 if TYPE_CHECKING:
@@ -47,6 +48,7 @@ def page_html(
     color: Quantity | str | None = None,
     ranges: Ranges = FITTING,
     own_picture: OwnPicture | None = None,
+    parts: PageParts | None = None,
 ) -> str:
     """Return the HTML page of a flattening as text.
 
@@ -55,8 +57,8 @@ def page_html(
         name: title of the page; by default the name of the file of the mesh.
         texture: image file for the model: PNG, JPEG, GIF or WebP.
         up: the model's upward axis in the first view, "x", "y" or "z"; "auto" is that of its format or shape.
-        show: display mode at the start: "checker", "picture", "charts", "qc", "area", "faults" (of the UVs),
-            "curvature" (of the model), "flat" (curvature of the flat metric), "plain" or, with `color`, "own"; by
+        show: display mode at the start: "checker", "picture", "charts", "qc", "area", "strain", "faults" (of the
+            UVs), "curvature" (of the model), "flat" (curvature of the flat metric), "plain" or, with `color`, "own"; by
             default the values of `color`, else the picture, else the checkerboard.
         color: quantity given by the user, or its name, see `own_quantity`.
         most_triangles: a mesh with more triangles is simplified for display.
@@ -64,6 +66,7 @@ def page_html(
         ranges: ends of the colour scales of QC distortion and of scale.
         own_picture: the image of the file that was read and (k, 2) its UVs at all polygon corners; shown first, unless
             another image, colours or a display mode are given.
+        parts: pieces that are shown instead of charts, with names of seams, at true scale instead of in a texture.
 
     Raises:
         OptionError: `up` or `show` is not valid, or `most_triangles` is not an integer.
@@ -81,10 +84,10 @@ def page_html(
         picture, own_uv = own_picture
     max_triangles = as_integer("most_triangles", most_triangles)
     quantity = color if color is None or isinstance(color, Quantity) else own_quantity(result, color)
-    content = content_of(result, max_triangles, quantity=quantity, ranges=ranges)
+    content = content_of(result, max_triangles, quantity=quantity, ranges=ranges, parts=parts)
     if name is None:
         name = "Flattening" if result.source is None else result.source.path.name
-    data = head_and_block(result, content, picture, name, up, show, text, own_uv=own_uv)
+    data = head_and_block(result, content, picture, name, up, show, text, own_uv=own_uv, parts=parts)
     head, arrays = as_payload(*data)
     before, between, after = _template()
     return "".join((before, head, between, arrays, after))

@@ -1,0 +1,166 @@
+"""The page of a pattern in the viewer."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+import shapes
+from axe import axe_source, findings
+from browsing import NARROW, WIDE, Visit, thing
+from chromium import browser_path
+from click.testing import CliRunner
+from flat_pieces import gores, sheet, two_pieces, with_dart
+
+from coneflat import Pattern
+from coneflat.apps.cli.main import cli
+from coneflat.apps.patterns import page_of_pattern
+from coneflat.apps.patterns.page import as_flattening, parts_of
+from coneflat.errors import UnknownFormatError
+
+pytest.importorskip("shapely")
+needs_browser = pytest.mark.skipif(browser_path() is None, reason="there is no Chromium here")
+
+PATTERNS = [two_pieces(shrink=0.9), with_dart(), gores(8), Pattern("sheet", sheet(), 1.0)]
+NAMES = ["pieces", "dart", "gores", "sheet"]
+
+
+@pytest.mark.parametrize("pattern", PATTERNS, ids=NAMES)
+def test_its_lengths_are_those_of_the_pattern(pattern):
+    result = as_flattening(pattern)
+    assert result.uv.min() >= 0
+    assert result.uv.max() == pytest.approx(1)
+    apart = result.uv[:, None] - result.uv
+    expected = pattern.surface.points[:, None] - pattern.surface.points
+    assert apart / result.uv_scale == pytest.approx(expected, abs=1e-9)
+    assert result.distortion.flipped == result.distortion.overlapping_pairs == 0
+    assert len(result.seams) == len(pattern.surface.seams)
+
+
+@pytest.mark.parametrize("pattern", PATTERNS, ids=NAMES)
+def test_strains_are_those_of_the_report(pattern):
+    strain = parts_of(pattern).strain
+    assert np.abs(strain).max() == pytest.approx(pattern.report()["strain_max"], abs=1e-12)
+    if pattern is PATTERNS[0]:
+        assert strain[pattern.surface.pieces == 0] == pytest.approx(0, abs=1e-12)
+        assert strain[pattern.surface.pieces == 1].min() == pytest.approx(-0.1)
+
+
+@pytest.mark.parametrize("pattern", PATTERNS, ids=NAMES)
+def test_numbers_are_in_the_middle_of_their_pieces(pattern):
+    parts, surface = parts_of(pattern), pattern.surface
+    assert np.array_equal(surface.pieces[parts.anchors], np.arange(pattern.piece_count))
+    for piece, anchor in enumerate(parts.anchors):
+        places = surface.places[surface.pieces == piece].reshape(-1, 2)
+        off = surface.places[anchor].mean(axis=0) - (places.min(axis=0) + places.max(axis=0)) / 2
+        assert np.abs(off).max() < 0.4 * np.ptp(places, axis=0).max()
+
+
+def test_the_tip_of_a_dart_is_a_cone_that_opens_as_far():
+    result = as_flattening(with_dart())
+    assert result.vertices[result.cones] == pytest.approx(np.array([[60, 40, 0]]))
+    (opening,) = result.curvatures
+    assert opening == pytest.approx(2 * np.arctan(1 / 4), abs=0.2)
+    assert np.abs(result.curvature_residual).max() < np.pi
+
+
+def test_names_of_seams():
+    parts = parts_of(two_pieces(shrink=0.9))
+    assert parts.seam_names == ["A"]
+    assert parts.seam_texts == ["Seam A, 80.0 mm eased to 72.0 mm"]
+    assert parts_of(with_dart()).seam_texts[0].startswith("Dart A, ")
+    assert parts_of(gores(8)).seam_names == list("ABCDEFGH")
+
+
+def test_a_pattern_is_viewed(tmp_path):
+    page = two_pieces().view(tmp_path / "toy.html")
+    assert page.read_text() == page_of_pattern(two_pieces())
+    with pytest.raises(UnknownFormatError, match="pages are written as"):
+        two_pieces().view(tmp_path / "toy.pdf")
+
+
+def test_the_command_writes_only_the_page_if_nothing_else_is_asked_for(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    shapes.write_obj(tmp_path / "box.obj", *shapes.box(1))
+    run = ["pattern", "box.obj", "--kind", "net", "--unit", "mm", "--scale", "50", "--view"]
+    done = CliRunner().invoke(cli, [*run, "box.html"])
+    assert done.exit_code == 0, done.output
+    assert "wrote box.html" in done.output
+    assert not (tmp_path / "box.pdf").exists()
+    page = (tmp_path / "box.html").read_text()
+    head = json.loads(page.split('id="head">')[1].split("</script>")[0])
+    assert head["show"] == "charts"
+    assert "1 piece" in head["title"]
+    names = head["parts"]["seam_names"]
+    assert names == list("ABCDEFG"[: len(names)])
+    assert head["seams"] == 7  # edges of a cube
+    assert [row[0] for row in head["rows"]][:2] == ["pieces", "seams"]
+    done = CliRunner().invoke(cli, [*run, "box.pdf"])
+    assert isinstance(done.exception, UnknownFormatError)
+    done = CliRunner().invoke(cli, [*run, "both.html", "-o", "both.svg"])
+    assert (done.exit_code, (tmp_path / "both.svg").exists()) == (0, True)
+
+
+@needs_browser
+@pytest.mark.parametrize("pattern", PATTERNS[:3], ids=NAMES[:3])
+def test_the_page_in_a_browser(browser, tmp_path, pattern):
+    path = tmp_path / "page.html"
+    path.write_text(page_of_pattern(pattern, name="Toy"))
+    visit = Visit(browser, path)
+    assert visit.page.inner_text("#show option:checked") == "Pieces"
+    for index, seam in enumerate(pattern.seams):
+        visit.page.keyboard.press("h")
+        facts = visit.page.inner_text("#facts")
+        assert facts.startswith(f"{'Dart' if seam.is_dart else 'Seam'} {seam.name}, ")
+        pieces = sorted(side.piece + 1 for side in seam.sides)
+        between = f"within piece {pieces[0]}" if pieces[0] == pieces[1] else "between pieces "
+        assert between in facts
+        assert visit.run(f"coneflat.model.seams[{index}].length") == len(seam.sides[0].halfedges)
+    visit.page.select_option("#show", "strain")
+    assert visit.page.inner_text("#scale-title").endswith("at true scale")
+    anchors = parts_of(pattern).anchors
+    x, y = visit.at("layout", thing("triangle", int(anchors[-1])))[0]
+    visit.page.mouse.move(x, y)
+    assert f"piece {pattern.piece_count}" in visit.page.inner_text("#facts")
+    assert "largest change of the length of a side" in visit.page.inner_text("#facts")
+    if pattern.darts:
+        visit.run("coneflat.state.set({picked: {kind: 'cone', index: 0}, hovered: null})")
+        assert visit.page.inner_text("#facts").startswith("Tip of a dart at vertex ")
+    visit.close()
+
+
+@needs_browser
+@pytest.mark.parametrize("size", [WIDE, NARROW], ids=["wide", "narrow"])
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_axe_finds_nothing_serious(browser, tmp_path, size, scheme):
+    source, path = axe_source(), tmp_path / "page.html"
+    path.write_text(page_of_pattern(with_dart()))
+    visit = Visit(browser, path, viewport=size, color_scheme=scheme, bypass_csp=True)
+    visit.page.keyboard.press("h")
+    visit.run("coneflat.state.set({report: true})")
+    assert findings(visit.page, source) == []
+    visit.close()
+
+
+@needs_browser
+def test_numbers_of_pieces_are_written_on_both_sides(browser, tmp_path):
+    path = tmp_path / "page.html"
+    pattern = two_pieces()
+    path.write_text(page_of_pattern(pattern, show="plain"))
+    visit = Visit(browser, path)
+    without = {}
+    for hides in (False, True):
+        if hides:
+            visit.run("coneflat.marks.drawNumbers = () => {}; coneflat.remark()")
+        for pane in ("model", "layout"):
+            picture = visit.picture(pane)
+            if not hides:
+                without[pane] = picture
+                continue
+            changed = np.argwhere(np.abs(picture - without[pane]).max(axis=2) > 40)
+            for anchor in parts_of(pattern).anchors:
+                (x, y), box = visit.at(pane, thing("triangle", int(anchor)))[0], visit.box(pane)
+                near = np.abs(changed - [y - box["y"], x - box["x"]]).max(axis=1) < 12
+                assert near.sum() > 20
+    visit.close()
