@@ -196,7 +196,7 @@ def test_lengths_have_units(text, length):
         ({"height": "0mm"}, "height must be a length, above 0"),
         ({"height": 100, "unit": "mm"}, "height and unit or scale cannot be combined"),
         ({"unit": "mm", "strain": "0%"}, "strain must be above 0"),
-        ({"unit": "mm", "kind": "net", "seams": [[0, 1]]}, "only cloth takes seams"),
+        ({"unit": "mm", "kind": "net", "seams": [[0, 1]]}, "seams and kind net cannot be combined"),
         ({"unit": "furlong"}, "unknown unit"),
     ],
 )
@@ -210,3 +210,64 @@ def test_the_size_is_that_of_the_unit():
     inches = coneflat.pattern(vertices, faces, unit="in", kind="net", page="none")
     assert inches.millimetres == 25.4
     assert np.ptp(inches.surface.mesh.vertices, axis=0) == pytest.approx(25.4 * np.ptp(vertices, axis=0))
+
+
+def test_triangles_without_area_are_replaced():
+    corners = [[x, y, 0.1 * x * y] for y in range(4) for x in range(4)]
+    quads = [[4 * j + i, 4 * j + i + 1, 4 * j + i + 5, 4 * j + i + 4] for j in range(3) for i in range(3)]
+    faces = [triangle for a, b, c, d in quads for triangle in ((a, b, c), (a, c, d))]
+    middle = len(corners)
+    corners.append(np.mean([corners[5], corners[10]], axis=0).tolist())
+    # The diagonal from 5 to 10 has a vertex in its middle on one side only, closed by a triangle without area.
+    split = [[5, middle, 9], [middle, 10, 9], [5, 10, middle]]
+    faces = [face for face in faces if face != (5, 10, 9)] + split
+    result = coneflat.pattern(corners, faces, unit="mm", scale=30, strain=0.1, page="none")
+    assert any("1 triangle without area" in note for note in result.notes)
+    assert np.abs(result.strains).max() <= 0.1
+    assert result.surface.mesh.euler_characteristic == 1
+
+
+def test_a_seam_with_two_tips_is_not_a_dart():
+    vertices, faces = shapes.sphere(2)
+    result = coneflat.pattern(vertices * [1, 1, 3], faces, height=100, strain="40%", tolerance=0, page="none")
+    both = [
+        s for s in result.seams if all(s.sides[0].points[e] == s.sides[1].points[-1 - e] for e in (0, -1))
+    ]
+    assert not any(seam.is_dart for seam in doubly_closed)
+
+
+def test_given_seams_stay_in_their_places():
+    count = 11
+    corners = [[x, y, 0] for y in range(count) for x in range(count)]
+    at = [(j * count + i) for j in range(count - 1) for i in range(count - 1)]
+    faces = [t for a in at for t in ((a, a + 1, a + count + 1), (a, a + count + 1, a + count))]
+    place = lambda x, y: y * count + x  # noqa: E731
+    ring = [
+        place(3, 3),
+        place(4, 3),
+        place(5, 3),
+        place(5, 4),
+        place(5, 5),
+        place(4, 5),
+        place(3, 5),
+        place(3, 4),
+    ]
+    pairs = np.stack([ring, np.roll(ring, -1)], axis=1)
+    result = coneflat.pattern(corners, faces, unit="cm", seams=pairs, page="none")
+    areas = np.bincount(result.surface.pieces, result.surface.edges.double_areas / 2)
+    assert sorted(areas) == pytest.approx([400, 9600])
+
+
+@pytest.mark.parametrize(
+    "options", [{"kind": "net", "strain": 0.1}, {"gores": 5}, {"kind": "net", "allowance": 7}, {"strain": 1}]
+)
+def test_options_of_other_kinds_are_errors(options):
+    with pytest.raises(OptionError):
+        coneflat.pattern(*shapes.sphere(1), unit="mm", **options)
+
+
+def test_a_long_strip_fits_on_one_sheet():
+    strip = [[0, 0, 0], [100, 0, 0], [100, 5, 0], [0, 5, 0]], [[0, 1, 2], [0, 2, 3]]
+    result = coneflat.pattern(*strip, unit="mm", page="none")
+    assert result.report()["pages"] == 1
+    assert result.piece_count == 1

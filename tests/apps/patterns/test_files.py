@@ -6,10 +6,12 @@ import sys
 from xml.etree import ElementTree
 
 import numpy as np
+import polyhedra
 import pytest
 from command import command
 from flat_pieces import gores, two_pieces, with_dart
 
+import coneflat
 from coneflat.apps.patterns.files import PATTERN_FORMATS
 from coneflat.apps.patterns.nesting import nested
 from coneflat.apps.patterns.notches import distances
@@ -116,6 +118,16 @@ def test_lengths_on_tiled_pages_are_those_of_the_pattern(tmp_path):
     assert nearest_gaps(expected_lengths(pattern), lines).max() < 1e-3
     # The ruler is on the first page.
     assert np.abs(lengths(pages[0]) - 100).min() < 1e-3
+
+
+def test_texts_of_a_dxf_are_those_of_the_drawing(tmp_path):
+    ezdxf = pytest.importorskip("ezdxf")
+    cube = polyhedra.cube()
+    net = coneflat.pattern(cube.vertices, cube.faces, kind="net", unit="cm", scale=5, page="none")
+    document = ezdxf.readfile(net.save(tmp_path / "cube.dxf"))
+    texts = sorted(entity.dxf.text for entity in document.modelspace().query("TEXT"))
+    assert texts == sorted(text.text for text in net.drawing().texts)
+    assert any("\u00b0" in text for text in texts)
 
 
 @pytest.mark.parametrize(("ending", "read"), [(".svg", lines_of_svg), (".dxf", lines_of_dxf)])

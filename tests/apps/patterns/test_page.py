@@ -161,6 +161,6 @@ def test_numbers_of_pieces_are_written_on_both_sides(browser, tmp_path):
             changed = np.argwhere(np.abs(picture - without[pane]).max(axis=2) > 40)
             for anchor in parts_of(pattern).anchors:
                 (x, y), box = visit.at(pane, thing("triangle", int(anchor)))[0], visit.box(pane)
-                near = np.abs(changed - [y - box["y"], x - box["x"]]).max(axis=1) < 12
-                assert near.sum() > 20
+                is_close = np.abs(changed - [y - box["y"], x - box["x"]]).max(axis=1) < 12
+                assert is_close.sum() > 20
     visit.close()

@@ -74,8 +74,8 @@ def share_of_accent(visit, pane, places, hovered=None):
         rings = np.array(visit.at(pane, thing("seam", hovered)))
         places = places[np.linalg.norm(places[:, None] - rings, axis=2).min(axis=1) > RING]
     columns, rows = np.floor(places - [box["x"], box["y"]]).astype(int).T + 2
-    near = [is_accent[rows + down, columns + right] for down in (-1, 0, 1) for right in (-1, 0, 1)]
-    return np.any(near, axis=0).mean()
+    around = [is_accent[rows + down, columns + right] for down in (-1, 0, 1) for right in (-1, 0, 1)]
+    return np.any(around, axis=0).mean()
 
 
 @needs_browser
@@ -93,8 +93,8 @@ def test_pointing_at_a_seam_shows_its_partner(visit, viewed):
         hovered = visit.state("hovered")
         assert hovered["kind"] == "seam"
         seen = numbers == numbers[hovered["index"]]
-        far = [int(edge) for edge in np.flatnonzero(seen) if edge != hovered["index"]]
-        sides = list(zip(*(visit.at("layout", thing("seam", edge)) for edge in far), strict=True))
+        distant = [int(edge) for edge in np.flatnonzero(seen) if edge != hovered["index"]]
+        sides = list(zip(*(visit.at("layout", thing("seam", edge)) for edge in distant), strict=True))
         assert len(sides) == 2
         assert all(share_of_accent(visit, "layout", side, hovered["index"]) > 0.9 for side in sides)
         visible = [

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from typing import Any
 
 from numpy.typing import ArrayLike
 
-from ...base import component_at_work, timing, warns
+from ...base import component_at_work, plural, timing, warns
 from ...options import read_options, settings, takes
 from .cloth import cloth_pieces
 from .development import Development
+from .finish import Finish
 from .gores import cut_gores
 from .model import Model, read_model
 from .nesting import nested
@@ -101,4 +102,15 @@ def _placed(model: Model, developed: Development, options: PatternOptions) -> Pa
         glued = glue_tabs(developed.surface, result.borders, options.tabs)
         tabs = tuple(Tab(tab.polygon, tab.piece) for tab in glued.tabs)
         result = replace(result, tabs=tabs, notes=(*result.notes, *glued.notes))
-    return nested(result)
+    return nested(replace(result, notes=(*result.notes, *_notes_on_short_seams(result))))
+
+
+def _notes_on_short_seams(result: Pattern) -> Iterator[str]:
+    """Yield a note on the seams that are shorter than the allowance is wide, as they are hard to sew."""
+    width = Finish.of(result.kind, result.settings).allowance
+    count = sum(min(seam.lengths) < width for seam in result.seams)
+    if count and result.is_sewn:
+        yield (
+            f"{plural(count, 'seam')} of {len(result.seams):,} are shorter than the {width:g} mm of the allowance: "
+            "more strain, a larger model or a smoother mesh needs fewer."
+        )

@@ -10,13 +10,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ... import TriangleMesh, check_mesh
-from ...base import FloatArray, IntArray
+from ...base import FloatArray, IntArray, plural
 from ...errors import OptionError
 from ...io import as_input
 from ...mesh import CheckedMesh
 from ...options import Options
 from ...source import InputMesh, marked_edges
 from ..view import upward_axis
+from .degenerate import without_degenerate
 from .options import PatternOptions
 from .units import MILLIMETRES, text_of_size
 
@@ -60,14 +61,14 @@ def read_model(mesh: Any, faces: ArrayLike | None, options: PatternOptions) -> M
         axis = np.array(options.axis) / np.linalg.norm(options.axis)
     factor, notes = _millimetres(vertices, axis, ending, options)
     # Far from the origin, differences of coordinates would lose digits.
-    centred = (vertices - vertices.mean(axis=0)) * factor
-    return Model(
-        checked.mesh.moved_to(centred),
-        axis,
-        factor,
-        _own_seams(source, checked, options),
-        (*checked.notes, *notes),
-    )
+    centred = checked.mesh.moved_to((vertices - vertices.mean(axis=0)) * factor)
+    sound, replaced = without_degenerate(centred)
+    if replaced:
+        notes = (
+            *notes,
+            f"Replaced {plural(replaced, 'triangle')} without area by the other diagonal beside them.",
+        )
+    return Model(sound, axis, factor, _own_seams(source, checked, options), (*checked.notes, *notes))
 
 
 def _own_seams(source: InputMesh, checked: CheckedMesh, options: PatternOptions) -> IntArray | None:

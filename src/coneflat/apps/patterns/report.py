@@ -12,6 +12,7 @@ from .papers import EDGE, Paper
 from .result import Pattern
 from .shapes import piece_shapes
 from .tiling import tiles_of
+from .units import text_of_size
 
 #: Numbers of the report, which `--require` takes.
 PATTERN_MEASURES = (
@@ -75,7 +76,11 @@ def rows_of(pattern: Pattern, report: dict[str, Any] | None = None) -> list[tupl
     """
     report = report_of(pattern) if report is None else report
     eased = f"sides of {report['eased_seams']} differ, by {report['ease_max']:.1f} mm at most"
+    size = text_of_size(np.ptp(pattern.surface.mesh.vertices, axis=0))
+    axis = np.array(pattern.settings.get("axis", (0.0, 0.0, 1.0)))
+    along = " ".join(f"{number:.3g}" for number in axis)
     rows = [
+        ("size", size, f"of the finished object along x, y and z; its height is along {along}"),
         ("pieces", f"{report['pieces']}", f"{report['area'] / 100:.0f} cm\u00b2 in total"),
         (
             "seams",
