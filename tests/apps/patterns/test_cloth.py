@@ -230,7 +230,7 @@ def test_triangles_without_area_are_replaced():
 def test_a_seam_with_two_tips_is_not_a_dart():
     vertices, faces = shapes.sphere(2)
     result = coneflat.pattern(vertices * [1, 1, 3], faces, height=100, strain="40%", tolerance=0, page="none")
-    both = [
+    doubly_closed = [
         s for s in result.seams if all(s.sides[0].points[e] == s.sides[1].points[-1 - e] for e in (0, -1))
     ]
     assert not any(seam.is_dart for seam in doubly_closed)

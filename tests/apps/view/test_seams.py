@@ -98,7 +98,7 @@ def test_pointing_at_a_seam_shows_its_partner(visit, viewed):
         assert len(sides) == 2
         assert all(share_of_accent(visit, "layout", side, hovered["index"]) > 0.9 for side in sides)
         visible = [
-            edge for edge in far
+            edge for edge in distant
             if visit.run(f"coneflat.marks.isSeen(coneflat.panes[0], {thing('seam', edge)}, coneflat.state)")
         ]  # fmt: skip
         places = [visit.at("model", thing("seam", edge))[0] for edge in visible]
