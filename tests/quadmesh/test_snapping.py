@@ -33,8 +33,8 @@ def test_more_of_the_sharp_edges_are_on_edges(askew: QuadMesh):
 def test_quads_remain_valid_and_on_the_surface(askew: QuadMesh):
     nearer = snapped(askew, SHARP, NO_FEATURES)
     np.testing.assert_array_equal(nearer.quads, askew.quads)
-    least = [least_jacobians(mesh.vertices, mesh.quads) for mesh in (askew, nearer)]
-    assert least[1].min() >= min(MIN_JACOBIAN, least[0].min()) - 1e-9
+    jacobians = [least_jacobians(mesh.vertices, mesh.quads) for mesh in (askew, nearer)]
+    assert jacobians[1].min() >= min(MIN_JACOBIAN, jacobians[0].min()) - 1e-9
     corners = nearer.surface.vertices[nearer.surface.faces[nearer.faces]]
     np.testing.assert_allclose(
         np.einsum("qi,qix->qx", nearer.barycentric, corners), nearer.vertices, atol=1e-9

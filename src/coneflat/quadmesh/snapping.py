@@ -49,9 +49,9 @@ def _moved_onto(quads: QuadMesh, ends: IntArray, fixed: IntArray) -> QuadMesh:
     edges = edge_indices(surface, ends)
     is_near, on, weights = nearest_on_edges(surface, edges, surface.vertices, quads.vertices[movable], reach)
     vertices, faces, barycentric = quads.vertices.copy(), quads.faces.copy(), quads.barycentric.copy()
-    near = movable[is_near]
-    faces[near], barycentric[near] = on, weights
-    vertices[near] = np.einsum("qi,qix->qx", weights, surface.vertices[surface.faces[on]])
+    moves = movable[is_near]
+    faces[moves], barycentric[moves] = on, weights
+    vertices[moves] = np.einsum("qi,qix->qx", weights, surface.vertices[surface.faces[on]])
     stays = blocked(quads.vertices, vertices, quads.quads)
     return replace(
         quads,
