@@ -10,11 +10,11 @@ from scipy.sparse import block_diag, csr_matrix
 from test_integer_grid import check_laws
 
 from coneflat import errors, integer_grid, quads
-from coneflat.quadmesh.quad_mesh import least_jacobians
 from coneflat.linalg.elimination import solutions_of
 from coneflat.mesh.connectivity import TriangleMesh
 from coneflat.quadmesh.extract import extract_quads
 from coneflat.quadmesh.features import edge_indices, sharp_edges
+from coneflat.quadmesh.quad_mesh import least_jacobians
 from coneflat.quadmesh.quality import measure_quads
 
 SHARP = np.deg2rad(40)
