@@ -14,6 +14,7 @@ from coneflat.linalg.elimination import solutions_of
 from coneflat.mesh.connectivity import TriangleMesh
 from coneflat.quadmesh.extract import extract_quads
 from coneflat.quadmesh.features import edge_indices, sharp_edges
+from coneflat.quadmesh.quad_mesh import least_jacobians
 from coneflat.quadmesh.quality import measure_quads
 
 SHARP = np.deg2rad(40)
@@ -217,6 +218,13 @@ def test_corners_in_an_array_are_read_or_refused(boundary):
     square = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]), np.array([[0, 1, 2], [0, 2, 3]])
     with pytest.raises(errors.ConeflatError, match=r"corner|curvature"):
         integer_grid(*square, quads=16, boundary=boundary)
+
+
+def test_caps_that_are_fans_have_places_for_cones():
+    """Else three cones are on the rim, where a cap has a corner of 180 degrees, and the last is in its middle."""
+    cylinder = shapes.cylinder(48, 8, 1.0, caps=True)
+    mesh = quads(*cylinder, quads=1500, sharp_angle=0.7, symmetry="none")
+    assert least_jacobians(mesh.vertices, mesh.quads).min() > 0.4
 
 
 @pytest.mark.parametrize("count", [10, 300])

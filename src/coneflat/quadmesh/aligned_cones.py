@@ -18,14 +18,14 @@ from scipy.sparse.csgraph import dijkstra
 from ..base import ComplexArray, FloatArray, IntArray, Stopwatch, limit_threads
 from ..errors import CurvatureError
 from ..flattener import flatten
-from ..geometry import coarse_mesh
+from ..geometry import coarse_mesh, double_areas, edge_lengths
 from ..mesh import CheckedMesh
 from ..mesh.connectivity import TriangleMesh
 from ..options import read_options
 from ..result import Flattening
 from .alignment import has_area
 from .cross_field import SHARP_ANGLE, directions_and_indices, is_mechanical, sharp_ends
-from .features import split_around, split_chords, vertex_graph
+from .features import lengths_along, split_around, split_chords, split_edges, vertex_graph, without_pillows
 from .limits import COARSE_TRIANGLES, NO_LIMIT, SquareLimit
 from .map_model import SAMPLES, MapModel
 from .mirror_planes import MirrorPlane, at_seam_ends, on_seam
@@ -45,6 +45,11 @@ PAIRS_PER_VERTEX, MAX_PAIRS_OF_FEW = 6_000, 10_000_000
 MIN_GAIN = 1e-3
 # Quarter turns: largest difference of the angle defect at a corner of the surface from the curvature of its cone.
 MAX_CORNER_ERROR = 0.25
+# Meshes of fewer triangles are split evenly.
+MIN_TRIANGLES = 60
+# Edges are split up to this length, relative to the root of the area, so often, in meshes of at most so many triangles.
+# Of six cylinders with caps that are fans, angles deviate by 2 to 3 degrees instead of 3 to 10, in the same time.
+MAX_EDGE, MAX_EDGE_SPLITS, MAX_TRIANGLES_TO_SPLIT = 0.1, 4, 2500
 # Bounds of the area distortion. Below, areas would cost more than missing cones; above, nothing.
 MIN_DISTORTION, MAX_DISTORTION = 1e-3, 1e3
 # How often the cost of areas is doubled to meet the bound, and the bound for a distortion of 1: the log of the ratio of
@@ -112,12 +117,26 @@ def _with_places(mesh: TriangleMesh, is_split: bool, sharp_angle: float) -> Tria
     """Return a mesh with vertices where cones may be needed, with all edges split if `is_split`."""
     if is_split:
         mesh = split_around(mesh, mesh.faces)
-    while len(mesh.faces) < 60:  # on a sphere, a grid has at least eight cones
+    if len(mesh.faces) >= MIN_TRIANGLES:
+        mesh = _without_long_edges(mesh)
+    while len(mesh.faces) < MIN_TRIANGLES:  # on a sphere, a grid has at least eight cones
         mesh = split_around(mesh, mesh.faces)
     mesh, _ = split_chords(mesh)
     finer, count = split_chords(mesh, sharp_ends(mesh, sharp_angle))
     # On coarse meshes these are most edges, and their triangles would get thin.
     return finer if 20 * count < len(mesh.edges) else mesh
+
+
+def _without_long_edges(mesh: TriangleMesh) -> TriangleMesh:
+    """Return a mesh of few triangles with its long edges split: the fan of a cap has no place but its centre."""
+    mesh = without_pillows(mesh)
+    longest = MAX_EDGE * float(np.sqrt(double_areas(edge_lengths(mesh.vertices, mesh.faces)).sum() / 2))
+    for _ in range(MAX_EDGE_SPLITS):
+        is_long = lengths_along(mesh, np.arange(len(mesh.edges))) > longest
+        if len(mesh.faces) > MAX_TRIANGLES_TO_SPLIT or not is_long.any():
+            break
+        mesh, _ = split_edges(mesh, is_long)
+    return mesh
 
 
 def aligned_cones(

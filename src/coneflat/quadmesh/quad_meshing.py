@@ -15,13 +15,13 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..base import Stopwatch, Unmet, plural, warns
+from ..base import IntArray, Stopwatch, Unmet, plural, warns
 from ..errors import CoarseGridError, ConeflatError, GridError, OptionError
 from ..options import read_options
 from .attempt import GridWithQuads, Outcome
 from .borders import with_borders
 from .crease_fit import crease_fit
-from .cross_field import sharp_ends
+from .cross_field import is_mechanical, sharp_ends
 from .extract import DegenerateQuads, extract_quads, find_quads
 from .integer_map import IntegerGrid
 from .limits import NO_LIMIT, NOTED_TIMES, SquareLimit
@@ -42,6 +42,7 @@ from .quality import inverted_count
 from .request import GridRequest
 from .simpler_mesh import SimplerMesh
 from .smooth import smooth_quads
+from .snapping import snapped
 from .surface_fit import fit_to_surface
 
 #: Quads, and how they fail to follow the surface.
@@ -285,17 +286,22 @@ def _meshed(request: GridRequest, rounds: int) -> _Meshed:
         simpler = SimplerMesh.of(request.checked, request.size, request.limit)
     with stages("smooth"):
         if simpler is None:
-            quad_mesh = smooth_quads(quad_mesh, rounds, grid.features)
+            quad_mesh = _smoothed(quad_mesh, rounds, request, grid.features)
         else:
-            moved = simpler.moved(quad_mesh)
-            quad_mesh = simpler.completed(
-                smooth_quads(moved, rounds, sharp_ends(simpler.surface, request.angle))
-            )
+            moved, ends = simpler.moved(quad_mesh), sharp_ends(simpler.surface, request.angle)
+            quad_mesh = simpler.completed(_smoothed(moved, rounds, request, ends))
     notes = *(() if simpler is None else simpler.notes), *grid.notes, *quad_mesh.notes
     quad_mesh = replace(quad_mesh, notes=notes, grid=grid, source=source)
     if simpler is None:
         return _Meshed(quad_mesh)
     return _Meshed(quad_mesh, True, simpler.filled_area, bool(simpler.is_filling.any()))
+
+
+def _smoothed(quad_mesh: QuadMesh, rounds: int, request: GridRequest, features: IntArray) -> QuadMesh:
+    """Return smoothed quads, with vertices moved onto sharp edges that quads should follow."""
+    quad_mesh = smooth_quads(quad_mesh, rounds, features)
+    follows_edges = request.sharp_angle is not None or is_mechanical(quad_mesh.surface)
+    return snapped(quad_mesh, request.angle, features) if rounds and follows_edges else quad_mesh
 
 
 def _checked(request: GridRequest, meshed: _Meshed) -> tuple[QuadMesh, tuple[str, ...]]:
