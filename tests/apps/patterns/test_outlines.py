@@ -6,6 +6,7 @@ from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
+import polyhedra
 import pytest
 from flat_pieces import gores, sheet, two_pieces, with_dart
 
@@ -224,6 +225,23 @@ def test_tabs_are_cut_out_with_their_piece():
     assert [shape.cut.area for shape in shapes_of(pattern)] == pytest.approx([4800 + 54 * 6, 4800])
     folds = [line for line in pattern.drawing().lines if line.layer == "fold"]
     assert lengths_of(folds) == pytest.approx([60])
+
+
+def test_slits_beside_tabs_are_cut():
+    """The lid of the wide box is a ring, and a wall of the narrow one fills its hole."""
+    mesh = polyhedra.box_on_box()
+    pattern = coneflat.pattern(mesh.vertices, mesh.faces, kind="net", height="200mm")
+    cut = shapely.MultiLineString(
+        [
+            np.vstack([line.points, line.points[:1]]) if line.is_closed else line.points
+            for line in pattern.drawing().lines
+            if line.layer in ("cut", "fold")
+        ]
+    )
+    assert sum(len(shape.slits) for shape in shapes_of(pattern)) == 3
+    for side in (side for seam in pattern.seams for side in seam.sides):
+        ends = pattern.surface.points[side.points]
+        assert shapely.distance(shapely.points((ends[1:] + ends[:-1]) / 2), cut).max() < 1e-4
 
 
 def test_folds_are_dashed_by_their_kind_with_their_angle():
