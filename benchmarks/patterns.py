@@ -114,7 +114,8 @@ def decimated(vertices: np.ndarray, faces: np.ndarray, triangles: int) -> Arrays
         return vertices, faces
     import fast_simplification
 
-    return fast_simplification.simplify(vertices, faces, 1 - triangles / len(faces))
+    small = fast_simplification.simplify(vertices, faces, 1 - triangles / len(faces))
+    return arrays(check_mesh(*small, repair=True).mesh)
 
 
 def cloth_cells(mesh: Arrays, percent: float) -> list[str]:
