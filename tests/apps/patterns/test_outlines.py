@@ -303,6 +303,26 @@ def test_a_roll_takes_pieces_of_nets_at_any_angle():
     assert nested(long).report()["sheet_height"] > 200
 
 
+@pytest.mark.parametrize(
+    ("height", "page", "problem"),
+    [
+        (1e5, "A4", "would fill 1,.* pages of A4, more than 2,000"),
+        (1e9, "none", r"would be .* m, more than 1 km"),
+    ],
+)
+def test_what_is_too_large_is_an_error(height, page, problem):
+    mesh = polyhedra.cube()
+    with pytest.raises(OptionError, match=problem):
+        coneflat.pattern(mesh.vertices, mesh.faces, kind="net", height=height, page=page)
+
+
+def test_a_large_pattern_is_drawn_on_one_page():
+    mesh = polyhedra.cube()
+    large = coneflat.pattern(mesh.vertices, mesh.faces, kind="net", height="100m", page="none")
+    assert large.drawing().width > 2e5
+    assert shapely.area(shapes_of(large)[0].cut) >= 6e10
+
+
 def test_the_grain_points_up():
     surface = sheet()
     angle = 0.7

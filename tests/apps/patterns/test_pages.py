@@ -147,7 +147,7 @@ def test_the_guide_shows_the_model_upright(tmp_path, axis, upward):
     path = tmp_path / "bar.stl"
     write_stl(path, polyhedra.hull([[x, y, z] for x in (-1, 1) for y in (-2, 2) for z in (-9, 9)]))
     pattern = coneflat.pattern(path, kind="net", height="100mm", axis=axis, repair=True)
-    assert pattern.axis.tolist() == np.eye(3)[upward].tolist()
+    assert pattern.settings["axis"] == tuple(np.eye(3)[upward])
     image = pages_of(pattern)[0][0].pictures[0].pixels
     rows, columns = ((image < 250).any(axis=2).any(axis=axis).sum() for axis in (1, 0))
     assert (rows > columns) == (upward == 2)

@@ -17,7 +17,7 @@ from .result import Pattern
 from .tables import Table, laid_out
 from .tiling import tiles_of
 from .units import area_text, text_of_size
-from .views import View, best_eye, view_of
+from .views import View, eye_and_up, view_of
 
 # Pixels of pictures per millimetre: 200 per inch.
 PIXELS = 200 / 25.4
@@ -78,8 +78,8 @@ def _overview(pattern: Pattern, drawing: Drawing, paper: Paper, own_paper: Paper
 
 def _pictures(pattern: Pattern, width: float, height: float, top: float) -> tuple[list[Picture], list[Text]]:
     """Return the pictures of the model and of its pieces moved apart, with their numbers."""
-    up = pattern.axis
-    eye = best_eye(pattern.surface, up)
+    axis = pattern.settings.get("axis")
+    eye, up = eye_and_up(pattern.surface, None if axis is None else np.asarray(axis))
     picture_width = (width - SPACE) / 2
     pixels = round(PIXELS * picture_width), round(PIXELS * height)
     pictures: list[Picture] = []

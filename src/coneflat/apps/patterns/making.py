@@ -92,7 +92,6 @@ def _placed(model: Model, developed: Development, options: PatternOptions) -> Pa
         kind=options.kind,
         surface=developed.surface,
         millimetres=model.millimetres,
-        axis=model.axis,
         folds=developed.folds,
         fold_angles=developed.fold_angles,
         notes=(*model.notes, *developed.notes),

@@ -28,8 +28,11 @@ if TYPE_CHECKING:
 GAP = 3.0
 # Random changes of the plan of a sheet that are tried, for all its widths together.
 TRIES = 150
-# Widest cell of the grid on which pieces are placed, mm, and smallest number of cells across a sheet.
-CELL, MIN_COLUMNS = 1.0, 400
+# Widest cell of the grid on which pieces are placed, mm, and smallest and largest number of cells across a sheet; the
+# largest one bounds the memory for sheets that are wider than 4 m.
+CELL, MIN_COLUMNS, MAX_COLUMNS = 1.0, 400, 4000
+# Pages that the area of the pieces fills at most.
+MAX_PAGES = 2000
 # Widths of a sheet without a given one, relative to the square root of the area of the pieces.
 WIDTHS = (1.1, 1.3, 1.6)
 # Columns of pages side by side that are tried, around those of a square sheet.
@@ -108,7 +111,7 @@ def _inset(packing: SheetPacking) -> SheetPacking:
 
 
 def _columns(width: float) -> int:
-    return max(MIN_COLUMNS, int(np.ceil(width / CELL)))
+    return int(np.clip(np.ceil(width / CELL), MIN_COLUMNS, MAX_COLUMNS))
 
 
 def _outlines(shapes: Sequence[PieceShape]) -> Outlines:
@@ -133,7 +136,14 @@ def _angles(shapes: Sequence[PieceShape], has_grain: bool) -> FloatArray:
 
 
 def _packed(pieces: _Pieces, shapes: Sequence[PieceShape], paper: Paper) -> SheetPacking:
+    area = sum(shape.cut.area for shape in shapes)
     if paper.width is not None and paper.height is not None:
+        count = area / (paper.inner_width * paper.inner_height)
+        if count > MAX_PAGES:
+            raise OptionError(
+                f"the pieces would fill {count:,.0f} pages of {paper.name}, more than {MAX_PAGES:,}: choose a smaller "
+                "height or scale, or page none and an SVG or DXF file"
+            )
         on_pages = pieces.pages(paper)
         return _fewest_pages(pieces, shapes, paper) if on_pages is None else _pages_in_rows(on_pages, paper)
     if paper.width is not None:
@@ -144,7 +154,6 @@ def _packed(pieces: _Pieces, shapes: Sequence[PieceShape], paper: Paper) -> Shee
                 "without its margins: choose a wider roll, a page size, or a smaller height"
             )
         return packing
-    area = sum(shape.cut.area for shape in shapes)
     widths = {max(factor * area**0.5, 1.01 * pieces.narrowest) for factor in WIDTHS}
     return min(_strips(pieces, sorted(widths)), key=lambda strip: strip[0] * strip[1].height)[1]
 

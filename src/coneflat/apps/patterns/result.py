@@ -33,7 +33,6 @@ class Pattern:
         surface: the surface at its final size, cut into pieces, which lie side by side in the plane without overlap,
             the grain along the second axis.
         millimetres: millimetres per unit of the model.
-        axis: (3,) unit vector of the upward direction of the model.
         folds: (f, 2) points of fold lines inside pieces, and `fold_angles` (f,) their dihedral angles in radians,
             positive for mountain folds, negative for valleys.
         tabs: tabs for glue, beside the pieces.
@@ -44,7 +43,6 @@ class Pattern:
     kind: str
     surface: CutSurface
     millimetres: float
-    axis: FloatArray = field(default_factory=lambda: np.array([0.0, 1.0, 0.0]))
     folds: IntArray = field(default_factory=lambda: np.empty((0, 2), dtype=np.int64))
     fold_angles: FloatArray = field(default_factory=lambda: np.empty(0))
     tabs: tuple[Tab, ...] = ()

@@ -11,7 +11,7 @@ from scipy.ndimage import distance_transform_edt
 
 from ...base import FloatArray, IntArray
 from ...geometry import fill_nearest, unit_vectors
-from ..view import eye_direction
+from ..view import eye_direction, upward_axis
 from .cut_surface import CutSurface
 
 # Directions from which the model may be seen, the first one preferred, and the size of the pictures that are compared.
@@ -42,17 +42,20 @@ class View:
     numbers: dict[int, tuple[FloatArray, float]]
 
 
-def best_eye(surface: CutSurface, up: FloatArray) -> FloatArray:
-    """Return the direction to the eye that shows most pieces, obliquely from above.
+def eye_and_up(surface: CutSurface, axis: FloatArray | None) -> tuple[FloatArray, FloatArray]:
+    """Return the direction to the eye that shows most pieces, obliquely from above, and the upward direction.
 
-    up: (3,) unit vector of the upward direction of the model.
+    axis: (3,) the upward direction of the model; None for the axis that probably points up.
     """
-    name = "xyz"[int(np.abs(up).argmax())]
+    mesh = surface.mesh
+    name = upward_axis(mesh.vertices, mesh.faces) if axis is None else "xyz"[int(np.abs(axis).argmax())]
+    upward = np.eye(3)["xyz".index(name)] if axis is None else np.asarray(axis, dtype=np.float64)
+    upward = upward / np.linalg.norm(upward)
     eyes = unit_vectors(np.array([eye_direction(words, name) for words in EYES]))
-    if up["xyz".index(name)] < 0:
-        eyes -= 2 * (eyes @ up).clip(max=0)[:, None] * up  # from above
-    shown = [len(view_of(surface, TRIAL, eye, up).numbers) for eye in eyes]
-    return eyes[int(np.argmax(shown))]
+    if axis is not None and axis["xyz".index(name)] < 0:
+        eyes -= 2 * (eyes @ upward).clip(max=0)[:, None] * upward  # from above
+    shown = [len(view_of(surface, TRIAL, eye, upward).numbers) for eye in eyes]
+    return eyes[int(np.argmax(shown))], upward
 
 
 def view_of(
