@@ -15,7 +15,7 @@ ENTITY, LAYER, LINE_TYPE, FLAGS, X, Y = 0, 8, 6, 70, 10, 20
 #: Flag of closed polylines.
 CLOSED = 1
 #: Distance up to which a point of the file is a point of the pattern, mm.
-SAME = 0.005
+TOLERANCE = 0.005
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +62,7 @@ def points_of_file(
     drawn = list(seam_lines(lines))
     corners = np.concatenate([line.points for line in drawn])
     distances, nearest = cKDTree(corners).query(points)
-    is_drawn = distances < SAME
+    is_drawn = distances < TOLERANCE
     result = np.where(is_drawn[:, None], corners[nearest], points)
     # Straight parts of outlines are drawn without the points between their ends.
     between = np.flatnonzero(is_border & ~is_drawn)
@@ -72,7 +72,7 @@ def points_of_file(
         along = tree.geometries[tree.nearest(places)]
         feet = shapely.line_interpolate_point(along, shapely.line_locate_point(along, places))
         result[between] = shapely.get_coordinates(feet)
-        is_drawn[between] = shapely.distance(feet, places) < SAME
+        is_drawn[between] = shapely.distance(feet, places) < TOLERANCE
     if (is_border & ~is_drawn).any():
         raise ValueError(f"{(is_border & ~is_drawn).sum()} points of the pattern are not in the file")
     return result, is_drawn

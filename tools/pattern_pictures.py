@@ -89,8 +89,8 @@ BEND_STEPS = 8
 def bracket(_: Measured) -> Arrays:
     """Return a bent sheet with slots, in millimetres."""
     along = [0.0]
-    for i, flat in enumerate(FLATS):
-        along.append(along[-1] + flat)
+    for i, length in enumerate(FLATS):
+        along.append(along[-1] + length)
         if i < len(BENDS):
             arc = RADIUS * np.radians(abs(BENDS[i]))
             along += (along[-1] + arc * np.arange(1, BEND_STEPS + 1) / BEND_STEPS).tolist()
@@ -113,8 +113,8 @@ def _profile(along: np.ndarray) -> np.ndarray:
     """Return (2, k) the places of a bent strip at distances along it: bends are cut into chords of their arc."""
     heading = np.zeros(len(along))
     start = 0.0
-    for flat, bend in zip(FLATS, BENDS, strict=False):
-        start += flat
+    for length, bend in zip(FLATS, BENDS, strict=False):
+        start += length
         arc = RADIUS * np.radians(abs(bend))
         heading += np.radians(bend) * np.clip((along - start) / arc, 0, 1)
         start += arc
