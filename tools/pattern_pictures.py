@@ -26,8 +26,8 @@ Arrays = tuple[np.ndarray, np.ndarray]
 
 #: The program of poppler that draws the pages of PDF files.
 PDF_TO_PNG = "pdftoppm"
-#: Width of a page in pixels, for the least and for the most pages, and the number from which pages are small.
-WIDE, NARROW, MANY = 420, 330, 7
+#: Width of a page in pixels, that of small ones, and the number of pages from which they are small.
+PAGE_WIDTH, SMALL_PAGE_WIDTH, SMALL_FROM = 420, 330, 7
 COLUMNS, BORDER, GAP = 4, 1, 6
 #: Triangles of the low-poly animal.
 LOW_POLY = 150
@@ -164,7 +164,7 @@ def pages_picture(example: Example, name: str, measured: Measured) -> Image.Imag
 
 def side_by_side(pages: list[Image.Image]) -> Image.Image:
     """Return pages in rows, each with a grey border."""
-    width = WIDE if len(pages) < MANY else NARROW
+    width = PAGE_WIDTH if len(pages) < SMALL_FROM else SMALL_PAGE_WIDTH
     small = [
         ImageOps.expand(
             page.resize((width, round(width * page.height / page.width)), Image.Resampling.LANCZOS),
