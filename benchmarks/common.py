@@ -15,6 +15,7 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "tests"))
 
 import chromium  # noqa: E402, F401 - for benchmarks that open a page
+import polyhedra  # noqa: E402, F401 - for benchmarks of patterns
 import shapes  # noqa: E402
 import stored_meshes  # noqa: E402
 

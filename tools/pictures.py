@@ -15,6 +15,7 @@ import numpy as np
 from markers import ROOT
 from measured import Measured
 from palette import IMAGES, save_figure_small, save_small
+from pattern_pictures import EXAMPLES, PDF_TO_PNG, has_pdf_reader, pages_picture
 from PIL import Image
 from quad_edges import draw_quads
 from quad_pictures import (
@@ -106,6 +107,12 @@ def draw_pictures(measured: Measured, names: list[str]) -> None:
             save_figure_small(draw(measured), name)
     if any(fnmatch("convergence", pattern) for pattern in names):
         _draw_convergence()
+    for name, example in EXAMPLES.items():
+        if any(fnmatch(name, pattern) for pattern in names) and measured.has(*example.models):
+            if has_pdf_reader():
+                save_small(pages_picture(example, name, measured), name, dither=False)
+            else:
+                print(f"{PDF_TO_PNG} is not installed: {name} is left as it is")
     for name, model in SCREENSHOTS.items():
         if any(fnmatch(name, pattern) for pattern in names) and measured.has(model):
             _take_screenshots(name, model, measured)

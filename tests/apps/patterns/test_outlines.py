@@ -6,6 +6,7 @@ from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
+import polyhedra
 import pytest
 from flat_pieces import gores, sheet, two_pieces, with_dart
 
@@ -226,6 +227,23 @@ def test_tabs_are_cut_out_with_their_piece():
     assert lengths_of(folds) == pytest.approx([60])
 
 
+def test_slits_beside_tabs_are_cut():
+    """The lid of the wide box is a ring, and a wall of the narrow one fills its hole."""
+    mesh = polyhedra.box_on_box()
+    pattern = coneflat.pattern(mesh.vertices, mesh.faces, kind="net", height="200mm")
+    cut = shapely.MultiLineString(
+        [
+            np.vstack([line.points, line.points[:1]]) if line.is_closed else line.points
+            for line in pattern.drawing().lines
+            if line.layer in ("cut", "fold")
+        ]
+    )
+    assert sum(len(shape.slits) for shape in shapes_of(pattern)) == 3
+    for side in (side for seam in pattern.seams for side in seam.sides):
+        ends = pattern.surface.points[side.points]
+        assert shapely.distance(shapely.points((ends[1:] + ends[:-1]) / 2), cut).max() < 1e-4
+
+
 def test_folds_are_dashed_by_their_kind_with_their_angle():
     surface = sheet()
     ends = np.array([[5, 9], [10, 14]])
@@ -283,6 +301,26 @@ def test_a_piece_wider_than_the_roll_is_an_error():
 def test_a_roll_takes_pieces_of_nets_at_any_angle():
     long = Pattern("sheet", sheet(200.0, 20.0), 1.0, settings={"page": "roll:60mm"})
     assert nested(long).report()["sheet_height"] > 200
+
+
+@pytest.mark.parametrize(
+    ("height", "page", "problem"),
+    [
+        (1e5, "A4", "would fill 1,.* pages of A4, more than 2,000"),
+        (1e9, "none", r"would be .* m, more than 1 km"),
+    ],
+)
+def test_what_is_too_large_is_an_error(height, page, problem):
+    mesh = polyhedra.cube()
+    with pytest.raises(OptionError, match=problem):
+        coneflat.pattern(mesh.vertices, mesh.faces, kind="net", height=height, page=page)
+
+
+def test_a_large_pattern_is_drawn_on_one_page():
+    mesh = polyhedra.cube()
+    large = coneflat.pattern(mesh.vertices, mesh.faces, kind="net", height="100m", page="none")
+    assert large.drawing().width > 2e5
+    assert shapely.area(shapes_of(large)[0].cut) >= 6e10
 
 
 def test_the_grain_points_up():

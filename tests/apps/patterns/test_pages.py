@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
+import polyhedra
 import pytest
 from flat_pieces import gores, sheet, two_pieces
 
+import coneflat
 from coneflat import Pattern
 from coneflat.apps.patterns.assembly import pattern_pages
 from coneflat.apps.patterns.drawing import Drawing, Line
@@ -126,6 +128,29 @@ def test_the_guide_comes_first_and_lists_all_pieces_and_seams(page):
     for page in pages:
         boxes = shapely.union_all([box_of(text) for text in page.drawing.texts])
         assert shapely.box(0, 0, paper.width, paper.height).covers(boxes)
+
+
+def write_stl(path, mesh):
+    corners = mesh.vertices[mesh.faces].tolist()
+    facets = (
+        "facet normal 0 0 0\nouter loop\n"
+        + "".join(f"vertex {x!r} {y!r} {z!r}\n" for x, y, z in triangle)
+        + "endloop\nendfacet\n"
+        for triangle in corners
+    )
+    path.write_text(f"solid bar\n{''.join(facets)}endsolid bar\n")
+
+
+@pytest.mark.parametrize(("axis", "upward"), [(None, 2), ((0, 1, 0), 1)])
+def test_the_guide_shows_the_model_upright(tmp_path, axis, upward):
+    """A bar along z, which is upward in STL files: it stands in the picture, or lies if y is upward."""
+    path = tmp_path / "bar.stl"
+    write_stl(path, polyhedra.hull([[x, y, z] for x in (-1, 1) for y in (-2, 2) for z in (-9, 9)]))
+    pattern = coneflat.pattern(path, kind="net", height="100mm", axis=axis, repair=True)
+    assert pattern.settings["axis"] == tuple(np.eye(3)[upward])
+    image = pages_of(pattern)[0][0].pictures[0].pixels
+    rows, columns = ((image < 250).any(axis=2).any(axis=axis).sum() for axis in (1, 0))
+    assert (rows > columns) == (upward == 2)
 
 
 def test_long_tables_go_on_to_further_pages():

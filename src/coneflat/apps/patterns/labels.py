@@ -18,33 +18,34 @@ if TYPE_CHECKING:
 # Mean width of a character of Helvetica, and height of a line of text with what is below its base line, both relative
 # to the height of capitals; rather too large than too small.
 CHARACTER_WIDTH, LINE_HEIGHT = 0.84, 1.5
-# Side of the cells in which shapes are looked up, mm: about the width of a name.
-CELL = 8.0
+# Side of the cells in which shapes are looked up, mm: about the width of a name; largest number of cells across.
+CELL, MAX_CELLS = 8.0, 1000
 
 
 class Shapes:
     """Shapes by the cells of a grid in which they are, so that those near a place are found quickly."""
 
-    def __init__(self) -> None:
+    def __init__(self, extent: float) -> None:
+        """Make a grid for shapes within an extent, mm."""
+        self._cell = max(CELL, extent / MAX_CELLS)
         self._by_cell: dict[tuple[int, int], list[Geometry]] = {}
 
     def add(self, shape: Geometry) -> None:
         """Add a shape."""
-        for cell in _cells(shape.bounds):
+        for cell in self._cells(shape):
             self._by_cell.setdefault(cell, []).append(shape)
 
     def meet(self, shape: Geometry) -> bool:
         """Return whether one of the shapes intersects another shape."""
         return any(
             shape.intersects(candidate)
-            for cell in _cells(shape.bounds)
+            for cell in self._cells(shape)
             for candidate in self._by_cell.get(cell, ())
         )
 
-
-def _cells(bounds: tuple[float, float, float, float]) -> Iterator[tuple[int, int]]:
-    left, low, right, high = (int(bound // CELL) for bound in bounds)
-    return product(range(left, right + 1), range(low, high + 1))
+    def _cells(self, shape: Geometry) -> Iterator[tuple[int, int]]:
+        left, low, right, high = (int(bound // self._cell) for bound in shape.bounds)
+        return product(range(left, right + 1), range(low, high + 1))
 
 
 class Labels:
@@ -58,7 +59,9 @@ class Labels:
         """Take the shape inside which they must be."""
         self.shape = shape
         self.texts: list[Text] = []
-        self._covered, self._lines = Shapes(), Shapes()
+        left, low, right, high = shape.bounds
+        extent = max(right - left, high - low)
+        self._covered, self._lines = Shapes(extent), Shapes(extent)
         shapely().prepare(shape)
 
     def is_free(self, box: Polygon, crosses_lines: bool = False) -> bool:

@@ -23,6 +23,8 @@ from .units import MILLIMETRES, text_of_size
 
 #: Units of formats whose specification gives one.
 FORMAT_UNITS = {".glb": "m", ".gltf": "m"}
+# Largest extent of a model, mm; a larger one has another unit.
+LARGEST = 1e6
 AXES: Mapping[str, FloatArray] = dict(zip("xyz", np.eye(3), strict=True))
 
 
@@ -60,6 +62,12 @@ def read_model(mesh: Any, faces: ArrayLike | None, options: PatternOptions) -> M
     if options.axis is not None:
         axis = np.array(options.axis) / np.linalg.norm(options.axis)
     factor, notes = _millimetres(vertices, axis, ending, options)
+    extents = np.ptp(vertices, axis=0) * factor
+    if extents.max() > LARGEST:
+        raise OptionError(
+            f"the model would be {text_of_size(extents)}, more than {LARGEST / 1e6:g} km: choose another unit, "
+            "a smaller scale, or a height"
+        )
     # Far from the origin, differences of coordinates would lose digits.
     centred = checked.mesh.moved_to((vertices - vertices.mean(axis=0)) * factor)
     sound, replaced = without_degenerate(centred)

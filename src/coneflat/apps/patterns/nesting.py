@@ -30,6 +30,8 @@ GAP = 3.0
 TRIES = 150
 # Cell of the grid on which pieces are placed, mm, and the smallest and the largest number of cells across a sheet.
 CELL, MIN_COLUMNS, MAX_COLUMNS = 1.0, 400, 1_200
+# Pages that the area of the pieces fills at most.
+MAX_PAGES = 2000
 # Widths of a sheet without a given one, relative to the square root of the area of the pieces.
 WIDTHS = (1.1, 1.3, 1.6)
 # Columns of pages side by side that are tried, around those of a square sheet.
@@ -133,7 +135,14 @@ def _angles(shapes: Sequence[PieceShape], has_grain: bool) -> FloatArray:
 
 
 def _packed(pieces: _Pieces, shapes: Sequence[PieceShape], paper: Paper) -> SheetPacking:
+    area = sum(shape.cut.area for shape in shapes)
     if paper.width is not None and paper.height is not None:
+        count = area / (paper.inner_width * paper.inner_height)
+        if count > MAX_PAGES:
+            raise OptionError(
+                f"the pieces would fill {count:,.0f} pages of {paper.name}, more than {MAX_PAGES:,}: choose a smaller "
+                "height or scale, or page none and an SVG or DXF file"
+            )
         on_pages = pieces.pages(paper)
         return _fewest_pages(pieces, shapes, paper) if on_pages is None else _pages_in_rows(on_pages, paper)
     if paper.width is not None:
@@ -144,7 +153,6 @@ def _packed(pieces: _Pieces, shapes: Sequence[PieceShape], paper: Paper) -> Shee
                 "without its margins: choose a wider roll, a page size, or a smaller height"
             )
         return packing
-    area = sum(shape.cut.area for shape in shapes)
     widths = {max(factor * area**0.5, 1.01 * pieces.narrowest + 2 * EDGE) for factor in WIDTHS}
     return min(_strips(pieces, sorted(widths)), key=lambda strip: strip[0] * strip[1].height)[1]
 

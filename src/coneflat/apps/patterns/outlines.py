@@ -89,7 +89,9 @@ class Rooms:
 
 
 def _cut_lines(shapes: Sequence[PieceShape]) -> Iterator[Line]:
-    return (Line("cut", ring, is_closed=True) for shape in shapes for ring in shape.cut_rings)
+    for shape in shapes:
+        yield from (Line("cut", ring, is_closed=True) for ring in shape.cut_rings)
+        yield from (Line("cut", slit) for slit in shape.slits)
 
 
 def _seam_lines(pattern: Pattern, finish: Finish) -> Iterator[Line]:

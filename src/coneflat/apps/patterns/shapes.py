@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from ...base import FloatArray, IntArray
-from .allowances import polygon_of, united, widened
+from .allowances import GRID, polygon_of, united, widened
 from .borders import Borders, Side
 from .cut_surface import CutSurface
 from .finish import HEM, Finish
@@ -39,12 +41,14 @@ class PieceShape:
         inside: what its borders enclose.
         cut: what is cut out: the piece with seam allowances and tabs.
         is_wider: whether it has any.
+        slits: the lines (2, 2) inside `cut` along which the piece touches itself.
     """
 
     seam_rings: tuple[FloatArray, ...]
     inside: Polygon
     cut: Polygon
     is_wider: bool
+    slits: tuple[FloatArray, ...] = ()
 
     @property
     def cut_rings(self) -> tuple[FloatArray, ...]:
@@ -73,8 +77,18 @@ def piece_shapes(
         cut = widened(rings, [width[loop] for loop in loops], finish.is_round) if has_allowance else inside
         if own_tabs:
             cut = united([cut, *(polygon_of([points]) for points in own_tabs)])
-        shapes.append(PieceShape(rings, inside, cut, has_allowance or bool(own_tabs)))
+        # Slits inside allowances are seam lines; without allowances and tabs, the rings are cut, slits among them.
+        slits = slits_of(rings) if own_tabs and not has_allowance else ()
+        shapes.append(PieceShape(rings, inside, cut, has_allowance or bool(own_tabs), slits))
     return shapes
+
+
+def slits_of(rings: Sequence[FloatArray]) -> tuple[FloatArray, ...]:
+    """Return the edges (2, 2) of rings of points (k, 2) that lie on each other in opposite directions, once each."""
+    edges = np.concatenate([np.stack([ring, np.roll(ring, -1, axis=0)], axis=1) for ring in rings])
+    ends = edges.reshape(-1, 4)
+    pairs = cKDTree(ends).query_ball_point(ends[:, [2, 3, 0, 1]], GRID)
+    return tuple(edges[i] for i, partners in enumerate(pairs) if any(i < partner for partner in partners))
 
 
 def tails(surface: CutSurface, halfedges: IntArray) -> IntArray:
