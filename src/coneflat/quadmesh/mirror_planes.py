@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import combinations
 
 import numpy as np
@@ -90,6 +91,9 @@ def mirror_planes(mesh: TriangleMesh) -> Iterator[MirrorPlane]:
         checked_normals = np.vstack([checked_normals, normal])
         heights = mesh.vertices @ normal
         offsets = float(centre @ normal), float(heights.min() + heights.max()) / 2
+        # Both are on a plane of symmetry; on 106,000 triangles without one, this saves the search for nearest points.
+        if abs(offsets[0] - offsets[1]) > 2 * images.reach:
+            continue
         planes = [_plane(normal, offset, size) for offset in offsets]
         if (plane := images.symmetric_plane(planes)) is not None:
             yield plane
@@ -175,15 +179,23 @@ class _Images:
     Attributes:
         mesh: the surface.
         size: its largest extent along an axis.
+        reach: a distance up to which images may be near the surface.
     """
 
     def __init__(self, mesh: TriangleMesh, size: float) -> None:
         self.mesh, self.size = mesh, size
-        self._vertices, self._triangles = cKDTree(mesh.vertices), TriangleTree(mesh.vertices, mesh.faces)
         self._edge = float(lengths_along(mesh, np.arange(len(mesh.edges))).mean())
-        self._reach = NEAR_EDGES * self._edge
+        self.reach = NEAR_EDGES * self._edge
         order = np.argsort(tie_key(mesh.vertices), kind="stable")
         self._samples = mesh.vertices[order[:: -(-len(order) // MAX_SAMPLES)]]
+
+    @cached_property
+    def _vertices(self) -> cKDTree:
+        return cKDTree(self.mesh.vertices)
+
+    @cached_property
+    def _triangles(self) -> TriangleTree:
+        return TriangleTree(self.mesh.vertices, self.mesh.faces)
 
     def symmetric_plane(self, planes: list[MirrorPlane]) -> MirrorPlane | None:
         """Return the first of some planes, or of refinements of these, that is a plane of symmetry, or None."""
@@ -196,15 +208,15 @@ class _Images:
 
     def share_near(self, plane: MirrorPlane) -> float:
         """Return the share of samples whose images are near the surface."""
-        return float((self._distances(plane.reflected(self._samples)) <= self._reach).mean())
+        return float((self._distances(plane.reflected(self._samples)) <= self.reach).mean())
 
     def refined(self, plane: MirrorPlane) -> MirrorPlane:
         """Return the plane that fits pairs of vertices, of which one is near the image of the other, best."""
         vertices = self.mesh.vertices
-        gaps, images = self._vertices.query(plane.reflected(vertices), distance_upper_bound=self._reach)
+        gaps, images = self._vertices.query(plane.reflected(vertices), distance_upper_bound=self.reach)
         paired = np.flatnonzero(np.isfinite(gaps))
         across = vertices[paired] - vertices[images[paired]]
-        if not (np.linalg.norm(across, axis=1) > self._reach).any():
+        if not (np.linalg.norm(across, axis=1) > self.reach).any():
             return plane
         normal = np.linalg.eigh(across.T @ across)[1][:, -1]
         normal = normal * np.sign(normal @ plane.normal)
