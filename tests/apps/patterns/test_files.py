@@ -14,7 +14,7 @@ from flat_pieces import gores, two_pieces, with_dart
 import coneflat
 from coneflat.apps.patterns.files import PATTERN_FORMATS
 from coneflat.apps.patterns.nesting import nested
-from coneflat.apps.patterns.notches import distances
+from coneflat.apps.patterns.polylines import distances
 from coneflat.errors import MeshFileError, OptionError, UnknownFormatError
 
 pytest.importorskip("shapely")

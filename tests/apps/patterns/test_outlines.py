@@ -17,8 +17,10 @@ from coneflat.apps.patterns.borders import find_borders
 from coneflat.apps.patterns.finish import Finish, read_allowances
 from coneflat.apps.patterns.labels import box_of
 from coneflat.apps.patterns.nesting import GAP, grain_up, nested
-from coneflat.apps.patterns.notches import distances, notches_of
-from coneflat.apps.patterns.shapes import Tab, piece_shapes
+from coneflat.apps.patterns.notches import notches_of
+from coneflat.apps.patterns.polylines import distances, ends_of_straight_parts
+from coneflat.apps.patterns.shapes import piece_shapes
+from coneflat.apps.patterns.tabs import Tab
 from coneflat.errors import OptionError
 
 shapely = pytest.importorskip("shapely")
@@ -219,8 +221,21 @@ def test_straight_parts_of_seams_of_nets_have_names_of_their_own():
     assert names.count("A1 (2)") + names.count("A1 (4)") == 1
 
 
+def test_straight_parts_of_seams_end_where_they_have_turned_by_half_a_degree():
+    def arc(degrees):
+        turns = np.radians(degrees)
+        return np.concatenate([[[0, 0]], np.cumsum(np.stack([np.cos(turns), np.sin(turns)], axis=1), axis=0)])
+
+    line = arc(np.zeros(11))
+    ends = [ends_of_straight_parts(line, arc(np.arange(11) * step)).tolist() for step in (0, 0.01, 0.2, 5)]
+    assert ends == [[0, 11], [0, 11], [0, 3, 6, 9, 11], list(range(12))]
+    corner = arc([0, 0, 0, 90, 90, 90, 90, 90, 90, 90, 90])
+    for sides in ((line, corner), (corner, line)):
+        assert ends_of_straight_parts(*sides).tolist() == [0, 3, 11]
+
+
 def test_tabs_are_cut_out_with_their_piece():
-    tab = Tab(np.array([[60.0, 10], [66, 16], [66, 64], [60, 70]]), 0)
+    tab = Tab(np.array([[60.0, 10], [66, 16], [66, 64], [60, 70]]), seam=0, side=0, piece=0, edges=(0, 1))
     pattern = replace(two_pieces("net"), tabs=(tab,))
     assert [shape.cut.area for shape in shapes_of(pattern)] == pytest.approx([4800 + 54 * 6, 4800])
     folds = [line for line in pattern.drawing().lines if line.layer == "fold"]

@@ -9,8 +9,9 @@ from functools import cached_property
 import numpy as np
 
 from ... import TriangleMesh
-from ...base import FloatArray, IntArray
+from ...base import IntArray
 from .cut_surface import CutSurface
+from .polylines import distances
 
 #: Difference of the lengths of the sides of a seam that can be neglected, mm.
 NEGLIGIBLE = 0.01
@@ -173,16 +174,11 @@ def _hems(sides: Sequence[Side], twins: IntArray) -> Iterator[Side]:
 
 
 def _seam(surface: CutSurface, name: str, first: Side, second: Side) -> Seam:
-    along = [_distances(surface.points[side.points]) for side in (first, second)]
+    along = [distances(surface.points[side.points]) for side in (first, second)]
     matching = along[1][-1] - along[1][::-1]
     on_surface = surface.edge_lengths[surface.mesh.halfedge_edges[first.halfedges]].sum()
     gap = float(np.abs(along[0] - matching).max())
     return Seam(name, (first, second), (float(along[0][-1]), float(along[1][-1])), float(on_surface), gap)
-
-
-def _distances(places: FloatArray) -> FloatArray:
-    """Return (k,) the distance of each of k points along the polyline through them."""
-    return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(places, axis=0), axis=1))])
 
 
 def letters(number: int) -> str:

@@ -42,8 +42,7 @@ class CutSurface:
     @cached_property
     def edge_lengths(self) -> FloatArray:
         """(e,) the lengths of the edges of the mesh."""
-        ends = self.mesh.vertices[self.mesh.edges]
-        return np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+        return lengths_of_edges(self.mesh)
 
     @cached_property
     def seams(self) -> IntArray:
@@ -98,3 +97,9 @@ class CutSurface:
         piece[self.corners] = self.pieces[:, None]
         apart = 1.5 * piece * np.ptp(self.points, axis=0).max()
         return find_overlaps((self.points + np.stack([apart, 0 * apart], axis=1))[self.corners]).pairs
+
+
+def lengths_of_edges(mesh: TriangleMesh) -> FloatArray:
+    """Return (e,) the lengths of the edges of a mesh."""
+    ends = mesh.vertices[mesh.edges]
+    return np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)

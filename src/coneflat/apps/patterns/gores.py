@@ -137,9 +137,7 @@ def _laid_out(flat: CutSurface) -> CutSurface:
 
 def _opened_vertices(flat: CutSurface) -> FloatArray:
     """Return (u, 3) the position of each point on the surface."""
-    vertices = np.empty((len(flat.points), 3))
-    vertices[flat.corners] = flat.mesh.vertices[flat.mesh.faces]
-    return vertices
+    return flat.mesh.vertices[flat.vertex_of_point]
 
 
 def _upright(flat: CutSurface, strips: _Strips) -> FloatArray:
@@ -173,9 +171,7 @@ def _ends_of_path(flat: CutSurface, sides: IntArray) -> IntArray:
             f"a seam between two gores has {plural(len(ends), 'end')} instead of two: gores need a surface around the "
             f"axis, like a ball, a vase or a lamp shade; choose another axis, or cloth"
         )
-    vertices = np.empty(len(flat.points), dtype=np.int64)
-    vertices[flat.corners] = flat.mesh.faces
-    return np.stack([vertices[ends], ends], axis=1)
+    return np.stack([flat.vertex_of_point[ends], ends], axis=1)
 
 
 def _middles(flat: CutSurface, seams: list[IntArray], places: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -8,6 +8,7 @@ import numpy as np
 
 from ... import TriangleMesh
 from ...base import BoolArray, FloatArray, IntArray
+from .cut_surface import lengths_of_edges
 
 # Distance from the axis or a half-plane up to which vertices lie on it, relative to the longest edge at the vertex: new
 # vertices nearer to others would make needles.
@@ -40,8 +41,7 @@ class AroundAxis:
             frame: (3, 3) orthonormal axes as rows, right-handed, the last one along the axis.
         """
         vertices = (mesh.vertices - centre) @ frame.T
-        ends = vertices[mesh.edges]
-        lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+        lengths = lengths_of_edges(mesh)
         longest = np.zeros(len(vertices))
         np.maximum.at(longest, mesh.edges.ravel(), np.repeat(lengths, 2))
         tolerance = SNAP * longest

@@ -19,7 +19,6 @@ from .nesting import nested
 from .net import unfold_net
 from .options import PatternOptions
 from .result import Pattern
-from .shapes import Tab
 from .sheet import develop_sheet
 from .tabs import glue_tabs
 
@@ -100,8 +99,7 @@ def _placed(model: Model, developed: Development, options: PatternOptions) -> Pa
     )
     if options.kind == "net" and options.tabs > 0:
         glued = glue_tabs(developed.surface, result.borders, options.tabs)
-        tabs = tuple(Tab(tab.polygon, tab.piece) for tab in glued.tabs)
-        result = replace(result, tabs=tabs, notes=(*result.notes, *glued.notes))
+        result = replace(result, tabs=glued.tabs, notes=(*result.notes, *glued.notes))
     return nested(replace(result, notes=(*result.notes, *_notes_on_short_seams(result))))
 
 

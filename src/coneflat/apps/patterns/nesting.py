@@ -50,11 +50,9 @@ def grain_up(surface: CutSurface, axis: FloatArray) -> CutSurface:
     points = surface.points.copy()
     areas = np.abs(signed_double_areas(surface.places))
     weights = np.bincount(surface.corners.ravel(), np.repeat(areas, 3), len(points))
-    vertex = np.empty(len(points), dtype=np.int64)
-    vertex[surface.corners] = surface.mesh.faces
     for piece in range(int(surface.pieces.max()) + 1):
         members = np.unique(surface.corners[surface.pieces == piece])
-        positions = surface.mesh.vertices[vertex[members]]
+        positions = surface.mesh.vertices[surface.vertex_of_point[members]]
         points[members] = rotated_up(points[members], positions, np.asarray(axis), weights[members])
     return replace(surface, points=points)
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from ...base import FloatArray, IntArray
 from .borders import Seam
+from .polylines import distances
 
 # Shortest seam with a notch, distance of notches, mm, and their largest number along a seam.
 MIN_SEAM, SPACING, MAX_NOTCHES = 25.0, 60.0, 12
@@ -62,11 +63,6 @@ def notches_of(seam: Seam, points: FloatArray) -> tuple[list[Notch], list[Notch]
     ours = [*_notches(first, edge, part)]
     theirs = [*_notches(second, len(second) - 2 - edge, 1 - part)]
     return ours, theirs
-
-
-def distances(line: FloatArray) -> FloatArray:
-    """Return (k,) the distance of each of k points along the polyline through them."""
-    return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
 
 
 def _places(along: FloatArray, targets: FloatArray) -> tuple[IntArray, FloatArray]:

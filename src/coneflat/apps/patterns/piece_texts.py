@@ -11,7 +11,7 @@ from ...base import FloatArray
 from .allowances import shapely
 from .drawing import Line, Text
 from .labels import LINE_HEIGHT, Labels, readable_angle, text_width
-from .notches import distances
+from .polylines import distances
 from .units import area_text
 
 # Factors of the height of a number that stands alone.

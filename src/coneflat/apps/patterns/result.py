@@ -17,7 +17,7 @@ from .borders import Borders, Seam, find_borders
 from .cut_surface import CutSurface
 from .drawing import Drawing
 from .finish import SEWN
-from .shapes import Tab
+from .tabs import Tab
 
 _DRAWING = EntryPoint[Drawing]("apps.patterns.outlines:drawing_of")
 _WRITE = EntryPoint[Path]("apps.patterns.files:write_pattern")

@@ -6,14 +6,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 
-import numpy as np
-
-from ...base import FloatArray, IntArray
+from ...base import FloatArray
 from .borders import Seam, Side
 from .finish import SEWN
-
-# Turn of a side at a point, radians, from which on it is a corner between two straight parts.
-CORNER = np.radians(2)
+from .polylines import ends_of_straight_parts
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +44,7 @@ def names_of(kind: str, seam: Seam, points: FloatArray, is_single: bool) -> Iter
             yield SeamName(text, side.piece, points[side.points])
         return
     first, second = (points[side.points] for side in seam.sides)
-    ends = _ends_of_parts(first, second[::-1])
+    ends = ends_of_straight_parts(first, second[::-1])
     for i, (begin, end) in enumerate(pairwise(ends.tolist())):
         name = f"{seam.name}{i + 1}" if len(ends) > 2 else seam.name
         back = slice(len(second) - 1 - end, len(second) - begin)
@@ -65,17 +61,3 @@ def _name_of_side(seam: Seam, side: Side, partner: str) -> str:
     length, length_there = seam.lengths if side is seam.sides[0] else seam.lengths[::-1]
     ease = f", ease {length - length_there:.1f} mm" if seam.is_eased and length > length_there else ""
     return f"{seam.name}{partner}{ease}"
-
-
-def _ends_of_parts(first: FloatArray, second: FloatArray) -> IntArray:
-    """Return the points at which straight parts of a seam begin and end; its sides run in the same direction."""
-    is_corner = (_turns(first) > CORNER) | (_turns(second) > CORNER)
-    return np.concatenate([[0], np.flatnonzero(is_corner) + 1, [len(first) - 1]])
-
-
-def _turns(line: FloatArray) -> FloatArray:
-    """Return (k - 2,) the angles by which a polyline turns at its inner points."""
-    steps = np.diff(line, axis=0)
-    before, after = steps[:-1], steps[1:]
-    across = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
-    return np.abs(np.arctan2(across, (before * after).sum(axis=1)))

@@ -11,25 +11,13 @@ from scipy.spatial import cKDTree
 
 from ...base import FloatArray, IntArray
 from .allowances import GRID, polygon_of, united, widened
-from .borders import Borders, Side
+from .borders import Borders
 from .cut_surface import CutSurface
 from .finish import HEM, Finish
+from .tabs import Tab
 
 if TYPE_CHECKING:
     from shapely import Polygon
-
-
-@dataclass(frozen=True, eq=False)
-class Tab:
-    """A tab for glue beside a piece.
-
-    Attributes:
-        polygon: (k, 2) its corners, mm, counterclockwise; it is folded along the line from the last to the first.
-        piece: the piece.
-    """
-
-    polygon: FloatArray
-    piece: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,9 +93,3 @@ def allowance_of_halfedges(triangles: int, borders: Borders, finish: Finish) -> 
     for hem in borders.hems:
         width[hem.halfedges] = finish.width(HEM)
     return width
-
-
-def sides_of_pieces(borders: Borders) -> list[tuple[str, Side]]:
-    """Return all sides with the names of their seams, HEM for those that are sewn to nothing."""
-    of_seams = [(seam.name, side) for seam in borders.seams for side in seam.sides]
-    return [*of_seams, *((HEM, hem) for hem in borders.hems)]

@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from ... import TriangleMesh, unwrap
-from ...base import FloatArray, IntArray, inner_calls
+from ...base import IntArray, inner_calls
 from ...errors import MeshError
 from ...geometry import angle_defect, corner_angles, edge_lengths
+from ...mesh import find_holes
 from ...seams import find_seams
-from .cut_surface import CutSurface
+from .cut_surface import CutSurface, lengths_of_edges
 from .development import Development
 from .relaxing import least_strained
 from .separation import without_overlaps
@@ -57,22 +58,9 @@ def _cuts(mesh: TriangleMesh) -> IntArray:
     defect = angle_defect(mesh.faces, angles, mesh.is_boundary_vertex)
     inner = np.where(mesh.is_boundary_vertex, 0.0, np.abs(defect))
     corners = np.flatnonzero(inner > MIN_CORNER)
-    holes = _holes(mesh)
+    holes = find_holes(mesh)
     flat_holes = [walk for walk in holes if abs(defect[mesh.tails[walk]].sum() + 2 * np.pi) <= MAX_REST]
     is_curved = inner.sum() - inner[corners].sum() > MAX_REST or len(corners) > MAX_CORNERS
     if is_curved or (not len(corners) and len(flat_holes) == len(holes)):
         return np.empty(0, dtype=np.int64)
-    return find_seams(mesh, corners, _edge_lengths(mesh), kept_holes=flat_holes)
-
-
-def _holes(mesh: TriangleMesh) -> list[IntArray]:
-    """Return the half-edges of each boundary loop but the longest."""
-    lengths = _edge_lengths(mesh)
-    return sorted(mesh.boundary_walks(), key=lambda walk: float(lengths[mesh.halfedge_edges[walk]].sum()))[
-        :-1
-    ]
-
-
-def _edge_lengths(mesh: TriangleMesh) -> FloatArray:
-    ends = mesh.vertices[mesh.edges]
-    return np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    return find_seams(mesh, corners, lengths_of_edges(mesh), kept_holes=flat_holes)

@@ -17,6 +17,7 @@ from ...mesh import NEXT, PREVIOUS, label_components
 from .borders import Borders, Side
 from .cut_surface import CutSurface
 from .development import MIN_FOLD_ANGLE
+from .polylines import ends_of_straight_parts
 from .tab_places import PlacedTabs, areas_of, largest_area, shrunk
 
 # Angle at the ends of a tab, radians; it is smaller where there is less room.
@@ -29,8 +30,6 @@ SPANS = ((0.0, 1.0), (0.0, 0.6), (0.4, 1.0), (0.2, 0.8))
 MAX_INSETS = 0.9
 # Angle up to which a free angle at an end is not used, radians.
 MIN_ANGLE = 0.02
-# Angle by which a side turns at a corner, radians.
-STRAIGHT = 1e-6
 # Distance of the two sides of a seam, relative to its length, below which it is closed in the plane.
 CLOSED = 1e-5
 
@@ -40,7 +39,8 @@ class Tab:
     """A glue tab.
 
     Attributes:
-        polygon: (4, 2) its corners, counterclockwise: from the start of its base on the border of the piece to its end.
+        polygon: (4, 2) its corners, mm, counterclockwise: from the start of its base on the border of the piece to its
+            end. It is folded along its base.
         seam: index of its seam in `Borders.seams`.
         side: 0 or 1, the side of the seam.
         piece: the piece.
@@ -122,24 +122,13 @@ class _Part:
 
 def _parts(surface: CutSurface, seam: int, sides: tuple[Side, Side]) -> Iterator[_Part]:
     """Yield the parts of a seam that are straight on both sides; not those that are closed in the plane."""
-    turns = [_turns(surface.points[side.points]) for side in sides]
-    corners = np.flatnonzero((turns[0] > STRAIGHT) | (turns[1][::-1] > STRAIGHT)) + 1
-    bounds = [0, *corners.tolist(), len(sides[0].halfedges)]
     places = surface.points[sides[0].points], surface.points[sides[1].points[::-1]]
-    for begin, end in pairwise(bounds):
+    for begin, end in pairwise(ends_of_straight_parts(*places).tolist()):
         first, second = (points[[begin, end]] for points in places)
         is_closed = sides[0].piece == sides[1].piece
         if is_closed and np.abs(first - second).max() <= CLOSED * np.linalg.norm(first[1] - first[0]):
             continue
         yield _Part(seam, sides, begin, end)
-
-
-def _turns(points: FloatArray) -> FloatArray:
-    """Return (k - 2,) by how much a polyline of k points turns at its inner points, radians."""
-    steps = np.diff(points, axis=0)
-    before, after = steps[:-1], steps[1:]
-    across = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
-    return np.abs(np.arctan2(across, (before * after).sum(axis=1)))
 
 
 class _Room:
