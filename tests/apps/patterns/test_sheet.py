@@ -124,6 +124,24 @@ def test_a_curved_sheet_is_strained_in_one_piece_without_cuts():
     assert find_bends(surface) == ()
 
 
+def test_a_stretched_component_leaves_the_bends_of_the_others():
+    bent, curved = extruded(L_PROFILE), check_mesh(*annulus(24, 5)).mesh
+    parts = (
+        (bent.vertices, bent.faces),
+        (curved.vertices + 100, curved.faces),
+        (bent.vertices + 200, bent.faces),
+    )
+    developed = develop_sheet(check_mesh(*join(*parts)).mesh)
+    bends = find_bends(developed.surface)
+    assert [bend.piece for bend in bends] == [0, 2]
+    np.testing.assert_allclose(np.degrees([abs(bend.angle) for bend in bends]), 90)
+    (note,) = developed.notes
+    assert note.startswith("1 of 3 pieces (2) cannot be bent without stretching")
+    strain = np.abs(developed.surface.edges.strains(developed.surface.points)).max()
+    assert note.endswith(f"by up to {100 * strain:.2g} %")
+    assert develop_sheet(bent).notes == ()
+
+
 def test_components_are_pieces_and_closed_surfaces_are_cut():
     two = join(grid(4, 4), (grid(4, 4)[0] + 3, grid(4, 4)[1]))
     assert develop_sheet(check_mesh(*two).mesh).surface.pieces.max() == 1

@@ -80,8 +80,16 @@ class _Crease:
         return float(abs(a[0] * b[1] - a[1] * b[0]))
 
 
+def largest_strains(surface: CutSurface) -> FloatArray:
+    """Return (p,) the largest relative change of length in each piece."""
+    strains = np.zeros(int(surface.pieces.max()) + 1)
+    piece = surface.piece_of_point[surface.edges.ends[:, 0]]
+    np.maximum.at(strains, piece, np.abs(surface.edges.strains(surface.points)))
+    return strains
+
+
 def find_bends(surface: CutSurface) -> tuple[Bend, ...]:
-    """Return the bends of a developable surface; none if it is stretched.
+    """Return the bends of the developable pieces of a surface; pieces that are stretched have none.
 
     A sharp bend is a straight fold between two flat parts, from border to border. Facets of equal width between
     parallel folds with equal angles form a bend about a cylinder through their folds; the folds beside it, where it
@@ -90,9 +98,8 @@ def find_bends(surface: CutSurface) -> tuple[Bend, ...]:
     Args:
         surface: the surface in the plane.
     """
-    if np.abs(surface.edges.strains(surface.points)).max() > DEVELOPABLE:
-        return ()
-    creases = _creases(surface)
+    is_stretched = largest_strains(surface) > DEVELOPABLE
+    creases = [crease for crease in _creases(surface) if not is_stretched[crease.piece]]
     at_part: dict[int, list[int]] = {}
     for number, crease in enumerate(creases):
         for part in crease.parts:

@@ -73,6 +73,13 @@ class CutSurface:
         rank[np.argsort(first)] = np.arange(len(first))
         return rank[inverse.reshape(-1)]
 
+    @cached_property
+    def piece_of_point(self) -> IntArray:
+        """(u,) the piece of each point."""
+        piece = np.zeros(len(self.points), dtype=np.int64)
+        piece[self.corners] = self.pieces[:, None]
+        return piece
+
     @property
     def places(self) -> FloatArray:
         """(m, 3, 2) the corners of the triangles in the plane."""
@@ -93,9 +100,7 @@ class CutSurface:
 
     def overlaps(self) -> IntArray:
         """Return (k, 2) the pairs of triangles of the same piece that overlap."""
-        piece = np.zeros(len(self.points))
-        piece[self.corners] = self.pieces[:, None]
-        apart = 1.5 * piece * np.ptp(self.points, axis=0).max()
+        apart = 1.5 * self.piece_of_point * np.ptp(self.points, axis=0).max()
         return find_overlaps((self.points + np.stack([apart, 0 * apart], axis=1))[self.corners]).pairs
 
 

@@ -77,7 +77,7 @@ class Pattern:
 
     @cached_property
     def bends(self) -> tuple[Bend, ...]:
-        """The bends of a sheet; none of other kinds, and of sheets that are stretched."""
+        """The bends of a sheet; none of other kinds, and of pieces that are stretched."""
         return find_bends(self.surface) if self.kind == "sheet" else ()
 
     @cached_property

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from ... import TriangleMesh, unwrap
-from ...base import IntArray, inner_calls
+from ...base import IntArray, inner_calls, list_some, plural
 from ...errors import MeshError
 from ...geometry import angle_defect, corner_angles, edge_lengths
 from ...mesh import find_holes
 from ...seams import find_seams
+from .bends import DEVELOPABLE, largest_strains
 from .cut_surface import CutSurface, lengths_of_edges
 from .development import Development
 from .relaxing import least_strained
@@ -46,7 +49,19 @@ def develop_sheet(mesh: TriangleMesh) -> Development:
         seams.append(vertices[component.edges[_cuts(component)]])
     with inner_calls():
         result = unwrap(mesh.vertices, mesh.faces, seams=("none", np.concatenate(seams)), charts="one")
-    return Development(without_overlaps(least_strained(CutSurface.of(result))))
+    surface = without_overlaps(least_strained(CutSurface.of(result)))
+    return Development(surface, notes=tuple(_notes_on_strain(surface)))
+
+
+def _notes_on_strain(surface: CutSurface) -> Iterator[str]:
+    """Yield a sentence about the pieces that are stretched."""
+    strains = largest_strains(surface)
+    pieces = np.flatnonzero(strains > DEVELOPABLE)
+    if len(pieces):
+        yield (
+            f"{len(pieces)} of {plural(len(strains), 'piece')} ({list_some((pieces + 1).tolist())}) cannot be bent "
+            f"without stretching and have no bend lines: lengths change by up to {100 * strains.max():.2g} %"
+        )
 
 
 def _cuts(mesh: TriangleMesh) -> IntArray:
