@@ -11,10 +11,12 @@ import pytest
 from flat_pieces import gores, sheet, two_pieces, with_dart
 
 import coneflat
-from coneflat import Pattern
+from coneflat import Pattern, TriangleMesh
 from coneflat.apps.patterns.allowances import polygon_of, widened
 from coneflat.apps.patterns.borders import find_borders
+from coneflat.apps.patterns.cut_surface import CutSurface
 from coneflat.apps.patterns.finish import Finish, read_allowances
+from coneflat.apps.patterns.gaps import notes_on_gaps
 from coneflat.apps.patterns.labels import box_of
 from coneflat.apps.patterns.nesting import GAP, grain_up, nested
 from coneflat.apps.patterns.notches import notches_of
@@ -350,3 +352,32 @@ def test_the_grain_points_up():
 def test_borders_of_a_pattern_by_hand():
     borders = find_borders(two_pieces().surface)
     assert [seam.lengths for seam in borders.seams] == [pytest.approx((80, 80))]
+
+
+def slotted(width: float) -> Pattern:
+    """A plate of 100 x 100 mm with a slot of 90 mm in the middle."""
+    x, y = np.array([0, 50 - width / 2, 50 + width / 2, 100]), np.array([0, 5, 95, 100])
+    points = np.array([[a, b] for a in x for b in y], dtype=float)
+    squares = [4 * i + j for i in range(3) for j in range(3) if (i, j) != (1, 1)]
+    faces = [face for k in squares for face in ([k, k + 4, k + 5], [k, k + 5, k + 1])]
+    mesh = TriangleMesh(np.pad(points, ((0, 0), (0, 1))), np.array(faces))
+    return Pattern("cloth", CutSurface(mesh, mesh.faces, points), 1.0)
+
+
+@pytest.mark.parametrize(
+    ("slot", "allowance"), [(10.0, 7.0), (10.0, 4.9), (14.1, 7.0), (2.0, 0.0), (5.0, 7.0)]
+)
+def test_a_slot_that_allowances_fill_is_noted(slot, allowance):
+    pattern = slotted(slot)
+    notes = [*notes_on_gaps(pattern.surface, pattern.borders, Finish(allowance))]
+    (shape,) = shapes_of(replace(pattern, settings={"allowance": allowance}))
+    is_filled = not len(shape.cut.interiors)
+    assert len(notes) == is_filled == (slot < 2 * allowance)
+    if is_filled:
+        assert f"less allowance than requested at hem of piece 1, along {180:.0f} mm" in notes[0]
+        assert f"{slot:.1f} mm" in notes[0]
+
+
+def test_corners_and_darts_are_no_gaps():
+    for pattern in (two_pieces("cloth"), gores(4, 6)):
+        assert not [*notes_on_gaps(pattern.surface, pattern.borders, Finish(7.0))]

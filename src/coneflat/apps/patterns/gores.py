@@ -27,8 +27,8 @@ def cut_gores(mesh: TriangleMesh, count: int, axis: FloatArray) -> Development:
     """Return a surface cut into strips between half-planes at equal angles around an axis.
 
     The axis goes through the centre of area. A half-plane goes through the vertex that is farthest from it. Triangles
-    are divided where half-planes cross them. Strips have the least strain that was found, and both sides of every seam
-    are equally long; they stand along it.
+    are divided where half-planes cross them; vertices near a half-plane slide onto it. Strips have the least strain
+    that was found, and both sides of every seam are equally long; they stand along it.
 
     Args:
         mesh: a connected surface: a body of revolution or a similar one, closed or open.
@@ -73,7 +73,7 @@ class _Strips:
         around = AroundAxis.of(mesh, centre, frame)
         for number in range(count):
             around = around.split_at(2 * np.pi * number / count)
-        vertices = np.concatenate([mesh.vertices, centre + around.vertices[len(mesh.vertices) :] @ frame])
+        vertices = centre + around.vertices @ frame
         turns = _turns(around.vertices[around.faces].mean(axis=1))
         return cls(
             TriangleMesh(vertices, around.faces), around, np.floor(turns * count).astype(int) % count, count

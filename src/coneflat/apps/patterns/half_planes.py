@@ -9,10 +9,10 @@ import numpy as np
 from ... import TriangleMesh
 from ...base import BoolArray, FloatArray, IntArray
 from .cut_surface import lengths_of_edges
+from .snapping import slid_to_axis, slid_to_crossings
 
-# Distance from the axis or a half-plane up to which vertices lie on it, relative to the longest edge at the vertex: new
-# vertices nearer to others would make needles.
-SNAP = 1e-5
+# Distance from the axis or a half-plane up to which vertices lie on it, relative to the longest edge at the vertex.
+ON_PLANE = 1e-5
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,17 +23,19 @@ class AroundAxis:
         vertices: (n, 3) positions: x and y across the axis.
         faces: (m, 3) triangles.
         is_pole: (n,) vertices on the axis.
-        tolerance: (n,) distance up to which a vertex lies on a half-plane.
+        is_fixed: (n,) vertices on the axis, or on a half-plane along which the surface is divided.
+        longest: (n,) length of the longest edge at each vertex.
     """
 
     vertices: FloatArray
     faces: IntArray
     is_pole: BoolArray
-    tolerance: FloatArray
+    is_fixed: BoolArray
+    longest: FloatArray
 
     @classmethod
     def of(cls, mesh: TriangleMesh, centre: FloatArray, frame: FloatArray) -> AroundAxis:
-        """Return a mesh with vertices where the axis meets it.
+        """Return a mesh with vertices where the axis meets it: vertices that slide there, or new ones.
 
         Args:
             mesh: the mesh.
@@ -44,10 +46,15 @@ class AroundAxis:
         lengths = lengths_of_edges(mesh)
         longest = np.zeros(len(vertices))
         np.maximum.at(longest, mesh.edges.ravel(), np.repeat(lengths, 2))
-        tolerance = SNAP * longest
-        is_pole = np.hypot(vertices[:, 0], vertices[:, 1]) <= tolerance
-        surface = cls(vertices, mesh.faces, is_pole, tolerance)
+        vertices = slid_to_axis(TriangleMesh(vertices, mesh.faces), longest)
+        is_pole = np.hypot(vertices[:, 0], vertices[:, 1]) <= ON_PLANE * longest
+        surface = cls(vertices, mesh.faces, is_pole, is_pole, longest)
         return surface._with_poles_on_edges()._with_poles_inside()
+
+    @property
+    def tolerance(self) -> FloatArray:
+        """(n,) distance up to which a vertex lies on the axis or a half-plane."""
+        return ON_PLANE * self.longest
 
     @property
     def radii(self) -> FloatArray:
@@ -82,29 +89,40 @@ class AroundAxis:
         poles = len(self.vertices) + np.arange(len(met))
         a, b, c = self.faces[met].T
         fans = [np.stack(triangle, axis=1) for triangle in ((a, b, poles), (b, c, poles), (c, a, poles))]
-        tolerance = self.tolerance[self.faces[met]].max(axis=1, initial=0.0)
-        surface = self._with_vertices(places, tolerance, True)
+        surface = self._with_vertices(places, self.longest[self.faces[met]].max(axis=1, initial=0.0), True)
         return replace(surface, faces=np.concatenate([self.faces[~is_met], *fans]))
 
-    def _with_vertices(self, places: FloatArray, tolerance: FloatArray, are_poles: bool) -> AroundAxis:
+    def _with_vertices(self, places: FloatArray, longest: FloatArray, are_poles: bool) -> AroundAxis:
         return replace(
             self,
             vertices=np.concatenate([self.vertices, places]),
             is_pole=np.concatenate([self.is_pole, np.full(len(places), are_poles)]),
-            tolerance=np.concatenate([self.tolerance, tolerance]),
+            is_fixed=np.concatenate([self.is_fixed, np.full(len(places), True)]),
+            longest=np.concatenate([self.longest, longest]),
         )
 
     def split_at(self, angle: float) -> AroundAxis:
-        """Return the surface with all triangles divided that the half-plane at an angle from the first axis crosses."""
+        """Return the surface with all triangles divided that the half-plane at an angle from the first axis crosses.
+
+        Vertices near it slide onto it.
+        """
+        mesh = TriangleMesh(self.vertices, self.faces)
+        crossings = self._crossings(mesh, angle)
+        vertices = slid_to_crossings(mesh, *crossings, self.is_fixed, self.longest)
+        is_moved = (vertices != self.vertices).any(axis=1)
+        surface = replace(self, vertices=vertices, is_fixed=self.is_fixed | is_moved)
+        return surface._split(*surface._crossings(TriangleMesh(vertices, self.faces), angle), False)
+
+    def _crossings(self, mesh: TriangleMesh, angle: float) -> tuple[BoolArray, FloatArray]:
+        """Return (e,) the edges that a half-plane crosses, and where, from their first to their second vertex."""
         across = self.vertices[:, 1] * np.cos(angle) - self.vertices[:, 0] * np.sin(angle)
         outward = self.vertices[:, 0] * np.cos(angle) + self.vertices[:, 1] * np.sin(angle)
         across = np.where(self.is_pole | (np.abs(across) <= self.tolerance), 0.0, across)
-        edges = TriangleMesh(self.vertices, self.faces).edges
-        first, second = across[edges].T
+        first, second = across[mesh.edges].T
         is_crossed = first * second < 0
         share = np.where(is_crossed, first / np.where(is_crossed, first - second, 1.0), 0.0)
-        is_crossed &= outward[edges[:, 0]] * (1 - share) + outward[edges[:, 1]] * share > 0
-        return self._split(is_crossed, share, False)
+        is_crossed &= outward[mesh.edges[:, 0]] * (1 - share) + outward[mesh.edges[:, 1]] * share > 0
+        return is_crossed, share
 
     def _split(self, is_split: BoolArray, share: FloatArray, are_poles: bool) -> AroundAxis:
         """Return the surface with a vertex on each of some edges, at a share of its length, none, one or two a face."""
@@ -116,7 +134,7 @@ class AroundAxis:
         places = self.vertices[edges[:, 0]] * (1 - part) + self.vertices[edges[:, 1]] * part
         if are_poles:
             places[:, :2] = 0.0
-        surface = self._with_vertices(places, self.tolerance[edges].max(axis=1), are_poles)
+        surface = self._with_vertices(places, self.longest[edges].max(axis=1), are_poles)
         middle = np.full(len(mesh.edges), -1)
         middle[is_split] = len(self.vertices) + np.arange(len(edges))
         return replace(

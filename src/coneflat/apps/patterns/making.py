@@ -13,6 +13,7 @@ from ...options import read_options, settings, takes
 from .cloth import cloth_pieces
 from .development import Development
 from .finish import Finish
+from .gaps import notes_on_gaps
 from .gores import cut_gores
 from .model import Model, read_model
 from .nesting import nested
@@ -100,7 +101,9 @@ def _placed(model: Model, developed: Development, options: PatternOptions) -> Pa
     if options.kind == "net" and options.tabs > 0:
         glued = glue_tabs(developed.surface, result.borders, options.tabs)
         result = replace(result, tabs=glued.tabs, notes=(*result.notes, *glued.notes))
-    return nested(replace(result, notes=(*result.notes, *_notes_on_short_seams(result))))
+    finish = Finish.of(result.kind, result.settings)
+    notes = *_notes_on_short_seams(result), *notes_on_gaps(result.surface, result.borders, finish)
+    return nested(replace(result, notes=(*result.notes, *notes)))
 
 
 def _notes_on_short_seams(result: Pattern) -> Iterator[str]:

@@ -59,8 +59,8 @@ def _notes_on_strain(surface: CutSurface) -> Iterator[str]:
     pieces = np.flatnonzero(strains > DEVELOPABLE)
     if len(pieces):
         yield (
-            f"{len(pieces)} of {plural(len(strains), 'piece')} ({list_some((pieces + 1).tolist())}) cannot be bent "
-            f"without stretching and have no bend lines: lengths change by up to {100 * strains.max():.2g} %"
+            f"no bend lines in {len(pieces)} of {plural(len(strains), 'piece')} ({list_some((pieces + 1).tolist())}), "
+            f"curved in two directions: lengths change by up to {100 * strains.max():.2g} %"
         )
 
 
