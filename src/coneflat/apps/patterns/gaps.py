@@ -81,8 +81,8 @@ def notes_on_gaps(surface: CutSurface, borders: Borders, finish: Finish) -> Iter
             lengths.append(length[halfedges].sum())
     if names:
         yield (
-            f"less allowance than requested at {list_some(dict.fromkeys(names))}, along {sum(lengths):.0f} mm: gaps of "
-            f"{min(gaps):.1f} mm or more between parts of a piece are filled by the allowances of both sides; make the "
+            f"less allowance than requested at {list_some(dict.fromkeys(names))}, along {sum(lengths):.0f} mm: gaps "
+            f"down to {min(gaps):.1f} mm between parts of a piece are filled by the allowances of both sides; make the "
             f"allowance narrower there"
         )
 
