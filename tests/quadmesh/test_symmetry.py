@@ -63,6 +63,32 @@ def check_symmetric(mesh, plane):
     np.testing.assert_allclose(places, mesh.vertices, atol=1e-9 * plane.size)
 
 
+def plate_with_a_hole(side=1.0):
+    """Return a flat plate: two triangles on the left, and on the right, for side 1, triangles around a hole."""
+    turns = 2 * np.pi * np.arange(16) / 16
+    circle = np.stack([1.25 + 0.3 * np.cos(turns), 0.4 + 0.3 * np.sin(turns)], axis=1)
+    corners = np.array([(0.0, -1.0), (2.0, -1.0), (2.0, 1.0), (0.0, 1.0)])
+    turns_of_corners = np.arctan2(corners[:, 1] - 0.4, corners[:, 0] - 1.25) % (2 * np.pi)
+    events = sorted([(turn, 6 + i) for i, turn in enumerate(turns)])
+    events = sorted(events + [(turn, 2 + i) for i, turn in enumerate(turns_of_corners)])
+    outer = max((turn, 2 + i) for i, turn in enumerate(turns_of_corners))[1]
+    inner, faces = 21, [(0, 2, 5), (0, 5, 1)]
+    for _, vertex in events:
+        faces.append((outer, vertex, inner))
+        outer, inner = (outer, vertex) if vertex >= 6 else (vertex, inner)
+    points = np.concatenate([[(-2.0, -1.0), (-2.0, 1.0)], corners, circle])
+    vertices = np.stack([side * points[:, 0], points[:, 1], np.zeros(len(points))], axis=1)
+    return vertices, np.array(faces)[:, :: int(side)]
+
+
+def overlapping_ellipsoids():
+    """Return two ellipsoids that overlap at x = 0, of which each is the image of the other."""
+    vertices, faces = shapes.sphere(3, bumps=0)
+    vertices = vertices * [1.0, 0.6, 0.4] @ motion(5)[0].T + [0.3, 0.0, 0.0]
+    count = len(vertices)
+    return np.concatenate([vertices, vertices * [-1, 1, 1]]), np.concatenate([faces, faces[:, ::-1] + count])
+
+
 def motion(seed):
     """Return a rotation and a translation."""
     rng = np.random.default_rng(seed)
@@ -164,6 +190,23 @@ class TestPlanes:
 
     def test_a_bumpy_sphere_has_none(self):
         assert not list(mirror_planes(TriangleMesh(*shapes.sphere(3))))
+
+    @pytest.mark.parametrize("side", [1.0, -1.0])
+    def test_a_hole_on_one_side_leaves_none(self, side):
+        mesh = TriangleMesh(*plate_with_a_hole(side))
+        assert mesh.euler_characteristic == 0
+        assert all(abs(plane.normal[2]) > 0.9 for plane in mirror_planes(mesh))
+        assert half_of(mesh) is None
+
+    def test_a_missing_triangle_of_a_box_leaves_none(self):
+        vertices, faces = shapes.box(1, (1.0, 1.3, 1.7))
+        for face in range(len(faces)):
+            assert not list(mirror_planes(TriangleMesh(vertices, np.delete(faces, face, 0))))
+
+    def test_overlapping_parts_that_are_images_of_each_other_have_no_half(self):
+        mesh = TriangleMesh(*overlapping_ellipsoids())
+        assert any(abs(plane.normal[0]) > 1 - 1e-9 for plane in mirror_planes(mesh))
+        assert half_of(mesh) is None
 
     def test_a_flat_sheet_is_not_divided_by_its_plane(self):
         vertices, faces = shapes.grid(7, 5)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..base import BoolArray, IntArray, Unmet, mask_of, plural
+from ..base import BoolArray, FloatArray, IntArray, Unmet, mask_of, plural
 from ..errors import GridError
 from ..geometry import quarters_around, sides_between
 from ..io import as_input
@@ -29,6 +29,9 @@ from .smooth import blocked, is_on_feature, smooth_quads, square_corners
 MAX_WORSE = 1.1
 # Largest share of the length of sharp edges that others follow and symmetric quads do not.
 MAX_UNFOLLOWED = 0.02
+# Largest difference of the directions of a triangle at the plane and of the image of the one beyond, radians: where
+# polygons that are not plane have other diagonals on both sides, these differ.
+MAX_TURN = 0.3
 # Rounds of smoothing between those of the vertices on the plane.
 ROUNDS_AT_ONCE = 2
 
@@ -79,13 +82,42 @@ def _half_beside(mesh: TriangleMesh, plane: MirrorPlane) -> Half | None:
     heights = np.append(heights, np.zeros(len(ends)))
     is_half = heights[cut.faces].max(axis=1) > 0
     # Faces are numbered as before, but for the new vertices on the plane.
-    half, vertices = part_of(cut.moved_to(np.concatenate([points, middles])), is_half)
+    cut = cut.moved_to(np.concatenate([points, middles]))
+    half, vertices = part_of(cut, is_half)
     seam = seam_edges(half, plane)
-    if not len(seam):
+    if not len(seam) or not _meets_its_image(cut, heights, plane):
         return None
     every = np.arange(len(mesh.vertices))
     origins = np.concatenate([np.stack([every, every], axis=1), ends])[vertices]
     return Half(plane, half, origins, float(lengths_along(half, seam).sum()))
+
+
+def _meets_its_image(cut: TriangleMesh, heights: FloatArray, plane: MirrorPlane) -> bool:
+    """Return whether the triangles on both sides of each edge on the plane are images of each other.
+
+    Parts that cross the plane and each other there, of which each is the image of the other, have other halves.
+
+    Args:
+        cut: the surface, whose triangles do not cross the plane.
+        heights: (n,) the distances of its vertices from the plane.
+        plane: the plane.
+    """
+    halfedges = cut.edge_halfedges[(heights[cut.edges] == 0).all(axis=1) & ~cut.is_boundary_edge]
+    apexes = cut.faces.ravel()[halfedges]
+    crosses = heights[apexes].prod(axis=1) < 0
+    apexes, halfedges = apexes[crosses], halfedges[crosses]
+    tails, heads = (cut.vertices[ends] for ends in cut.ends_of(halfedges[:, 0]))
+    along = heads - tails
+    along = along / np.maximum(np.linalg.norm(along, axis=1), np.finfo(float).tiny)[:, None]
+    first, second = cut.vertices[apexes[:, 0]], plane.reflected(cut.vertices[apexes[:, 1]])
+    first, second = (
+        arms - np.einsum("ex,ex->e", arms, along)[:, None] * along for arms in (first - tails, second - tails)
+    )
+    lengths = [np.linalg.norm(arms, axis=1) for arms in (first, second)]
+    least = np.minimum(*lengths)
+    gaps = np.linalg.norm(first * lengths[1][:, None] - second * lengths[0][:, None], axis=1)
+    gaps /= np.maximum(np.maximum(*lengths), np.finfo(float).tiny)
+    return bool((gaps <= np.maximum(MAX_TURN * least, 4 * SAME_PLACE * plane.size)).all())
 
 
 def half_request(request: GridRequest) -> GridRequest | None:
