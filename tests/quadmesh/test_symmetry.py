@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import mechanical
 import numpy as np
 import pytest
@@ -14,9 +16,11 @@ from coneflat import check_mesh
 from coneflat.errors import OptionError
 from coneflat.mesh.connectivity import TriangleMesh
 from coneflat.quadmesh.extract import extract_quads
+from coneflat.quadmesh.mirror_choice import fault, on_given_surface
 from coneflat.quadmesh.mirror_planes import MirrorPlane, mirror_planes
 from coneflat.quadmesh.mirrored import half_of
 from coneflat.quadmesh.remesh import area_of
+from coneflat.quadmesh.request import GridRequest
 
 
 def mirrored_ball(rounds=3, seed=0):
@@ -135,6 +139,9 @@ def test_mechanical_shapes_whose_triangles_are_not_symmetric(name):
     mesh = coneflat.quads(vertices, faces, quads=1500)
     planes = list(mirror_planes(check_mesh(vertices, faces).mesh))
     check_symmetric(mesh, planes[0].scaled(-check_mesh(vertices, faces).exponent))
+    # They are quads of the given surface, not of a half and its image.
+    np.testing.assert_array_equal(mesh.surface.faces, faces)
+    np.testing.assert_allclose(mesh.surface.vertices, vertices, rtol=1e-15)
 
 
 def test_an_open_surface_with_sizes():
@@ -231,6 +238,57 @@ def test_worse_quads_are_not_symmetric():
     (note,) = set(mesh.notes) - set(without.notes)
     assert note.startswith("The quads are not symmetric about the plane across (0.707, -0.707, 0) at")
     assert "irregular vertices instead of" in note
+
+
+def test_a_note_on_the_number_of_squares_is_about_the_whole():
+    vertices, faces = shapes.sphere(3, bumps=0)
+    vertices = vertices * [1.0, 0.8, 0.6]
+    vertices[:, 1] += 0.4 * vertices[:, 0] ** 2
+    vertices[:, 2] += 0.3 * vertices[:, 1]
+    grid = coneflat.integer_grid(vertices, faces, quads=150)
+    assert any(note.startswith("The grid is symmetric") for note in grid.notes)
+    assert f"The grid has an area of {grid.squares:,.0f} squares, not 150." in grid.notes
+
+
+class TestChoice:
+    @pytest.fixture
+    def ball(self):
+        mesh = mirrored_ball()
+        options = {"quads": 300, "symmetry": "none"}
+        return coneflat.quads(*mesh, **options), GridRequest.of(*mesh, options, {})
+
+    def test_quads_are_not_worse_than_themselves(self, ball):
+        quads, request = ball
+        assert not fault(quads, quads, request)
+
+    def test_inverted_quads_are_worse(self, ball):
+        quads, request = ball
+        vertices = quads.vertices.copy()
+        first, second = quads.quads[0, [0, 2]]
+        vertices[[first, second]] = vertices[[second, first]]
+        assert "180 degrees or more instead of 0" in fault(replace(quads, vertices=vertices), quads, request)
+
+    def test_worse_angles_are_worse(self, ball):
+        quads, request = ball
+        sheared = replace(quads, vertices=quads.vertices @ [[1, 0.2, 0], [0, 1, 0], [0, 0, 1]])
+        assert "degrees on average instead of" in fault(sheared, quads, request)
+        vertices, quad = quads.vertices.copy(), quads.quads[0]
+        vertices[quad[0]] += 0.35 * (vertices[quad[2]] - vertices[quad[0]])
+        assert "an angle would be off by" in fault(replace(quads, vertices=vertices), quads, request)
+
+    def test_a_filled_hole_is_worse(self, ball):
+        quads, request = ball
+        first = np.arange(len(quads.quads)) == 0
+        assert "holes or components" in fault(quads.without(first), quads, request)
+
+    def test_quads_of_the_given_surface_stay_in_place(self, ball):
+        quads, _ = ball
+        mesh = quads.surface
+        moved = replace(quads, vertices=1.001 * quads.vertices)
+        restored = on_given_surface(moved, mesh)
+        np.testing.assert_array_equal(restored.vertices, moved.vertices)
+        places = np.einsum("qi,qix->qx", restored.barycentric, mesh.vertices[mesh.faces[restored.faces]])
+        assert np.linalg.norm(places - moved.vertices, axis=1).max() < 0.002
 
 
 def test_unknown_words_are_refused():

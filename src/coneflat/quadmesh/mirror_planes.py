@@ -256,9 +256,9 @@ class _Images:
             return True
         vertices = self.mesh.vertices
         points = np.concatenate([vertices[np.unique(ends)], vertices[ends].mean(axis=1)])
-        images, tails, heads = plane.reflected(points), *ends.T
+        images = plane.reflected(points)
         # Each edge is a triangle without area.
-        faces = np.stack([tails, heads, heads], axis=1)
+        faces = ends[:, [0, 1, 1]]
         on, weights = TriangleTree(vertices, faces).nearest(images)
         nearest = np.einsum("qi,qix->qx", weights, vertices[faces[on]])
         return bool((np.linalg.norm(nearest - images, axis=1) <= SAME_PLACE * self.size).all())

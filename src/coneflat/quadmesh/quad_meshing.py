@@ -25,15 +25,8 @@ from .cross_field import is_mechanical, sharp_ends
 from .extract import DegenerateQuads, extract_quads, find_quads
 from .integer_map import IntegerGrid
 from .limits import NO_LIMIT, NOTED_TIMES, SquareLimit
-from .mirrored import (
-    are_symmetric,
-    asymmetry_note,
-    doubled_grid,
-    doubled_quads,
-    fault,
-    half_request,
-    smoothed_beside,
-)
+from .mirror_choice import are_symmetric, asymmetry_note, fault, on_given_surface, topology_gap
+from .mirrored import doubled_grid, doubled_quads, half_request, smoothed_beside
 from .no_grid import REASONS, NoGrid, or_reason
 from .options import QuadOptions
 from .policies import find_grid, on_coarse_mesh
@@ -218,7 +211,7 @@ def _attempt(request: GridRequest, rounds: int) -> Attempt:
         return plain
     symmetric = _mirrored(request, half, rounds)
     if isinstance(plain, NoGrid):
-        if isinstance(symmetric, NoGrid):
+        if isinstance(symmetric, NoGrid) or topology_gap(symmetric):
             raise plain.error
         return symmetric, ()
     quad_mesh, problems = plain
@@ -246,7 +239,10 @@ def _mirrored(request: GridRequest, half: GridRequest, rounds: int) -> QuadMesh 
     with request.stages("smooth"):
         quad_mesh = smoothed_beside(quad_mesh, half.mirror, rounds, features)
     symmetric = doubled_quads(quad_mesh, half.mirror, request.angle)
-    notes = *request.checked.notes, *symmetric.notes, f"The quads are symmetric about {half.mirror}."
+    checked = request.checked
+    surface = checked.mesh.moved_to(np.ldexp(checked.mesh.vertices, -checked.exponent))
+    symmetric = on_given_surface(symmetric, surface)
+    notes = *checked.notes, *symmetric.notes, f"The quads are symmetric about {half.mirror}."
     meshed = replace(meshed, quad_mesh=replace(symmetric, notes=notes), filled_area=2 * meshed.filled_area)
     quad_mesh, problems = _checked(request, meshed)
     return NoGrid(CoarseGridError("; ".join(problems))) if problems else quad_mesh

@@ -167,7 +167,7 @@ def _detours(quads: QuadMesh, edges: IntArray, longest: float) -> FloatArray:
 
 
 def surface_samples(vertices: FloatArray, faces: IntArray, spacing: float) -> FloatArray:
-    """Return (s, 3) sample points of triangles: their vertices, and rows with a given spacing, at most `MAX_ROWS` each."""
+    """Return (s, 3) sample points of triangles: their vertices, and rows with a given spacing or `MAX_ROWS`."""
     longest = edge_lengths(vertices, faces).max(axis=1)
     rows = np.minimum(np.ceil(longest / spacing), MAX_ROWS).astype(np.int64)
     is_long = rows > 1
