@@ -16,7 +16,7 @@ from coneflat import check_mesh
 from coneflat.errors import OptionError
 from coneflat.mesh.connectivity import TriangleMesh
 from coneflat.quadmesh.extract import extract_quads
-from coneflat.quadmesh.mirror_choice import fault, on_given_surface
+from coneflat.quadmesh.mirror_choice import fault, fault_of_angles, on_given_surface
 from coneflat.quadmesh.mirror_planes import MirrorPlane, mirror_planes
 from coneflat.quadmesh.mirrored import half_of
 from coneflat.quadmesh.remesh import area_of
@@ -241,13 +241,22 @@ def test_worse_quads_are_not_symmetric():
 
 
 def test_a_note_on_the_number_of_squares_is_about_the_whole():
-    vertices, faces = shapes.sphere(3, bumps=0)
-    vertices = vertices * [1.0, 0.8, 0.6]
-    vertices[:, 1] += 0.4 * vertices[:, 0] ** 2
-    vertices[:, 2] += 0.3 * vertices[:, 1]
-    grid = coneflat.integer_grid(vertices, faces, quads=150)
+    vertices, faces = mirrored_ball()
+    grid = coneflat.integer_grid(vertices, faces, quads=40)
     assert any(note.startswith("The grid is symmetric") for note in grid.notes)
-    assert f"The grid has an area of {grid.squares:,.0f} squares, not 150." in grid.notes
+    assert f"The grid has an area of {grid.squares:,.0f} squares, not 40." in grid.notes
+
+
+def test_progress_of_both_searches_rises():
+    fractions = []
+    mesh = coneflat.quads(
+        *mirrored_ball(), quads=300, progress=lambda _, fraction: fractions.append(fraction)
+    )
+    assert any(note.startswith("The quads are symmetric") for note in mesh.notes)
+    assert fractions == sorted(fractions)
+    assert fractions[0] == 0
+    assert fractions[-1] == 1
+    assert sum(0.5 < fraction < 1 for fraction in fractions) > 2
 
 
 class TestChoice:
@@ -260,21 +269,22 @@ class TestChoice:
     def test_quads_are_not_worse_than_themselves(self, ball):
         quads, request = ball
         assert not fault(quads, quads, request)
+        assert not fault_of_angles(quads, quads)
 
     def test_inverted_quads_are_worse(self, ball):
-        quads, request = ball
+        quads, _ = ball
         vertices = quads.vertices.copy()
         first, second = quads.quads[0, [0, 2]]
         vertices[[first, second]] = vertices[[second, first]]
-        assert "180 degrees or more instead of 0" in fault(replace(quads, vertices=vertices), quads, request)
+        assert "180 degrees or more instead of 0" in fault_of_angles(replace(quads, vertices=vertices), quads)
 
     def test_worse_angles_are_worse(self, ball):
-        quads, request = ball
+        quads, _ = ball
         sheared = replace(quads, vertices=quads.vertices @ [[1, 0.2, 0], [0, 1, 0], [0, 0, 1]])
-        assert "degrees on average instead of" in fault(sheared, quads, request)
+        assert "degrees on average instead of" in fault_of_angles(sheared, quads)
         vertices, quad = quads.vertices.copy(), quads.quads[0]
         vertices[quad[0]] += 0.35 * (vertices[quad[2]] - vertices[quad[0]])
-        assert "an angle would be off by" in fault(replace(quads, vertices=vertices), quads, request)
+        assert "an angle would be off by" in fault_of_angles(replace(quads, vertices=vertices), quads)
 
     def test_a_filled_hole_is_worse(self, ball):
         quads, request = ball

@@ -48,11 +48,11 @@ def fault(symmetric: QuadMesh, quads: QuadMesh, request: GridRequest) -> str:
     ratios = [max(number / requested, requested / number) for number in numbers]
     if ratios[0] > MAX_WORSE * ratios[1]:
         return f"they would be {numbers[0]:,} instead of {numbers[1]:,}"
-    return _fault_of_angles(symmetric, quads) or _fault_at_creases(symmetric, quads, request)
+    return _fault_at_creases(symmetric, quads, request)
 
 
-def _fault_of_angles(symmetric: QuadMesh, quads: QuadMesh) -> str:
-    """Return how much worse the angles of symmetric quads are, "" if they are not."""
+def fault_of_angles(symmetric: QuadMesh, quads: QuadMesh) -> str:
+    """Return how much worse the angles of smoothed symmetric quads are, "" if they are not."""
     inverted = [inverted_count(mesh) for mesh in (symmetric, quads)]
     if inverted[0] > inverted[1]:
         return f"{inverted[0]:,} would have an angle of 180 degrees or more instead of {inverted[1]:,}"

@@ -25,7 +25,14 @@ from .cross_field import is_mechanical, sharp_ends
 from .extract import DegenerateQuads, extract_quads, find_quads
 from .integer_map import IntegerGrid
 from .limits import NO_LIMIT, NOTED_TIMES, SquareLimit
-from .mirror_choice import are_symmetric, asymmetry_note, fault, on_given_surface, topology_gap
+from .mirror_choice import (
+    are_symmetric,
+    asymmetry_note,
+    fault,
+    fault_of_angles,
+    on_given_surface,
+    topology_gap,
+)
 from .mirrored import doubled_grid, doubled_quads, half_request, smoothed_beside
 from .no_grid import REASONS, NoGrid, or_reason
 from .options import QuadOptions
@@ -206,10 +213,10 @@ def _attempt(request: GridRequest, rounds: int) -> Attempt:
         half = half_request(request)
     if half is None or half.mirror is None:
         return _attempt_without_symmetry(request, rounds)
-    plain = or_reason(_attempt_without_symmetry)(request, rounds)
+    plain = or_reason(_attempt_without_symmetry)(request.as_part(0.0, 0.5), rounds)
     if not isinstance(plain, NoGrid) and not plain[1] and are_symmetric(plain[0], half.mirror):
         return plain
-    symmetric = _mirrored(request, half, rounds)
+    symmetric = _mirrored(request.as_part(0.5, 1.0), half.as_part(0.5, 1.0), rounds)
     if isinstance(plain, NoGrid):
         if isinstance(symmetric, NoGrid) or topology_gap(symmetric):
             raise plain.error
@@ -218,7 +225,9 @@ def _attempt(request: GridRequest, rounds: int) -> Attempt:
     if isinstance(symmetric, NoGrid):
         reason = symmetric.reason
     else:
-        reason = "" if problems else fault(symmetric, quad_mesh, request)
+        reason = ""
+        if not problems:
+            reason = fault(symmetric, quad_mesh, request) or fault_of_angles(symmetric, quad_mesh)
         if not reason:
             return symmetric, ()
     return replace(quad_mesh, notes=(*quad_mesh.notes, asymmetry_note(half.mirror, reason))), problems
@@ -416,7 +425,8 @@ def integer_grid(
 def _symmetric_grid(request: GridRequest, half: GridRequest) -> Outcome:
     """Return the grid of a symmetric surface: a symmetric one, unless it is worse than another."""
     assert half.mirror is not None
-    plain, symmetric = find_grid(request), _mirrored_grid(request, half)
+    plain = find_grid(request.as_part(0.0, 0.5))
+    symmetric = _mirrored_grid(request, half.as_part(0.5, 1.0))
     if isinstance(plain, NoGrid):
         return plain if isinstance(symmetric, NoGrid) else symmetric
     if isinstance(symmetric, NoGrid):
