@@ -10,7 +10,7 @@ import shapes
 from coneflat import check_mesh, measure_quads, quads
 from coneflat.quadmesh.crease_fit import FOLLOWED, crease_fit
 from coneflat.quadmesh.cross_field import SHARP_ANGLE, is_mechanical
-from coneflat.quadmesh.mirrored import MAX_UNFOLLOWED
+from coneflat.quadmesh.mirror_choice import MAX_UNFOLLOWED
 from coneflat.quadmesh.remesh import is_thin, remeshed
 
 SHARP = np.deg2rad(40)

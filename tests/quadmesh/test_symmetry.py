@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import mechanical
 import numpy as np
 import pytest
@@ -14,9 +16,11 @@ from coneflat import check_mesh
 from coneflat.errors import OptionError
 from coneflat.mesh.connectivity import TriangleMesh
 from coneflat.quadmesh.extract import extract_quads
+from coneflat.quadmesh.mirror_choice import fault, fault_of_angles, on_given_surface
 from coneflat.quadmesh.mirror_planes import MirrorPlane, mirror_planes
 from coneflat.quadmesh.mirrored import half_of
 from coneflat.quadmesh.remesh import area_of
+from coneflat.quadmesh.request import GridRequest
 
 
 def mirrored_ball(rounds=3, seed=0):
@@ -61,6 +65,32 @@ def check_symmetric(mesh, plane):
     corners = mesh.surface.vertices[mesh.surface.faces[mesh.faces]]
     places = np.einsum("qi,qix->qx", mesh.barycentric, corners)
     np.testing.assert_allclose(places, mesh.vertices, atol=1e-9 * plane.size)
+
+
+def plate_with_a_hole(side=1.0):
+    """Return a flat plate: two triangles on the left, and on the right, for side 1, triangles around a hole."""
+    turns = 2 * np.pi * np.arange(16) / 16
+    circle = np.stack([1.25 + 0.3 * np.cos(turns), 0.4 + 0.3 * np.sin(turns)], axis=1)
+    corners = np.array([(0.0, -1.0), (2.0, -1.0), (2.0, 1.0), (0.0, 1.0)])
+    turns_of_corners = np.arctan2(corners[:, 1] - 0.4, corners[:, 0] - 1.25) % (2 * np.pi)
+    events = sorted([(turn, 6 + i) for i, turn in enumerate(turns)])
+    events = sorted(events + [(turn, 2 + i) for i, turn in enumerate(turns_of_corners)])
+    outer = max((turn, 2 + i) for i, turn in enumerate(turns_of_corners))[1]
+    inner, faces = 21, [(0, 2, 5), (0, 5, 1)]
+    for _, vertex in events:
+        faces.append((outer, vertex, inner))
+        outer, inner = (outer, vertex) if vertex >= 6 else (vertex, inner)
+    points = np.concatenate([[(-2.0, -1.0), (-2.0, 1.0)], corners, circle])
+    vertices = np.stack([side * points[:, 0], points[:, 1], np.zeros(len(points))], axis=1)
+    return vertices, np.array(faces)[:, :: int(side)]
+
+
+def overlapping_ellipsoids():
+    """Return two ellipsoids that overlap at x = 0, of which each is the image of the other."""
+    vertices, faces = shapes.sphere(3, bumps=0)
+    vertices = vertices * [1.0, 0.6, 0.4] @ motion(5)[0].T + [0.3, 0.0, 0.0]
+    count = len(vertices)
+    return np.concatenate([vertices, vertices * [-1, 1, 1]]), np.concatenate([faces, faces[:, ::-1] + count])
 
 
 def motion(seed):
@@ -109,6 +139,9 @@ def test_mechanical_shapes_whose_triangles_are_not_symmetric(name):
     mesh = coneflat.quads(vertices, faces, quads=1500)
     planes = list(mirror_planes(check_mesh(vertices, faces).mesh))
     check_symmetric(mesh, planes[0].scaled(-check_mesh(vertices, faces).exponent))
+    # They are quads of the given surface, not of a half and its image.
+    np.testing.assert_array_equal(mesh.surface.faces, faces)
+    np.testing.assert_allclose(mesh.surface.vertices, vertices, rtol=1e-15)
 
 
 def test_an_open_surface_with_sizes():
@@ -165,6 +198,23 @@ class TestPlanes:
     def test_a_bumpy_sphere_has_none(self):
         assert not list(mirror_planes(TriangleMesh(*shapes.sphere(3))))
 
+    @pytest.mark.parametrize("side", [1.0, -1.0])
+    def test_a_hole_on_one_side_leaves_none(self, side):
+        mesh = TriangleMesh(*plate_with_a_hole(side))
+        assert mesh.euler_characteristic == 0
+        assert all(abs(plane.normal[2]) > 0.9 for plane in mirror_planes(mesh))
+        assert half_of(mesh) is None
+
+    def test_a_missing_triangle_of_a_box_leaves_none(self):
+        vertices, faces = shapes.box(1, (1.0, 1.3, 1.7))
+        for face in range(len(faces)):
+            assert not list(mirror_planes(TriangleMesh(vertices, np.delete(faces, face, 0))))
+
+    def test_overlapping_parts_that_are_images_of_each_other_have_no_half(self):
+        mesh = TriangleMesh(*overlapping_ellipsoids())
+        assert any(abs(plane.normal[0]) > 1 - 1e-9 for plane in mirror_planes(mesh))
+        assert half_of(mesh) is None
+
     def test_a_flat_sheet_is_not_divided_by_its_plane(self):
         vertices, faces = shapes.grid(7, 5)
         half = half_of(TriangleMesh(vertices * [2.0, 1.0, 1.0], faces))
@@ -188,6 +238,67 @@ def test_worse_quads_are_not_symmetric():
     (note,) = set(mesh.notes) - set(without.notes)
     assert note.startswith("The quads are not symmetric about the plane across (0.707, -0.707, 0) at")
     assert "irregular vertices instead of" in note
+
+
+def test_a_note_on_the_number_of_squares_is_about_the_whole():
+    vertices, faces = mirrored_ball()
+    grid = coneflat.integer_grid(vertices, faces, quads=40)
+    assert any(note.startswith("The grid is symmetric") for note in grid.notes)
+    assert f"The grid has an area of {grid.squares:,.0f} squares, not 40." in grid.notes
+
+
+def test_progress_of_both_searches_rises():
+    fractions = []
+    mesh = coneflat.quads(
+        *mirrored_ball(), quads=300, progress=lambda _, fraction: fractions.append(fraction)
+    )
+    assert any(note.startswith("The quads are symmetric") for note in mesh.notes)
+    assert fractions == sorted(fractions)
+    assert fractions[0] == 0
+    assert fractions[-1] == 1
+    assert sum(0.5 < fraction < 1 for fraction in fractions) > 2
+
+
+class TestChoice:
+    @pytest.fixture
+    def ball(self):
+        mesh = mirrored_ball()
+        options = {"quads": 300, "symmetry": "none"}
+        return coneflat.quads(*mesh, **options), GridRequest.of(*mesh, options, {})
+
+    def test_quads_are_not_worse_than_themselves(self, ball):
+        quads, request = ball
+        assert not fault(quads, quads, request)
+        assert not fault_of_angles(quads, quads)
+
+    def test_inverted_quads_are_worse(self, ball):
+        quads, _ = ball
+        vertices = quads.vertices.copy()
+        first, second = quads.quads[0, [0, 2]]
+        vertices[[first, second]] = vertices[[second, first]]
+        assert "180 degrees or more instead of 0" in fault_of_angles(replace(quads, vertices=vertices), quads)
+
+    def test_worse_angles_are_worse(self, ball):
+        quads, _ = ball
+        sheared = replace(quads, vertices=quads.vertices @ [[1, 0.2, 0], [0, 1, 0], [0, 0, 1]])
+        assert "degrees on average instead of" in fault_of_angles(sheared, quads)
+        vertices, quad = quads.vertices.copy(), quads.quads[0]
+        vertices[quad[0]] += 0.35 * (vertices[quad[2]] - vertices[quad[0]])
+        assert "an angle would be off by" in fault_of_angles(replace(quads, vertices=vertices), quads)
+
+    def test_a_filled_hole_is_worse(self, ball):
+        quads, request = ball
+        first = np.arange(len(quads.quads)) == 0
+        assert "holes or components" in fault(quads.without(first), quads, request)
+
+    def test_quads_of_the_given_surface_stay_in_place(self, ball):
+        quads, _ = ball
+        mesh = quads.surface
+        moved = replace(quads, vertices=1.001 * quads.vertices)
+        restored = on_given_surface(moved, mesh)
+        np.testing.assert_array_equal(restored.vertices, moved.vertices)
+        places = np.einsum("qi,qix->qx", restored.barycentric, mesh.vertices[mesh.faces[restored.faces]])
+        assert np.linalg.norm(places - moved.vertices, axis=1).max() < 0.002
 
 
 def test_unknown_words_are_refused():

@@ -26,6 +26,23 @@ _ask: ContextVar[Callable[[], None] | None] = ContextVar("coneflat_ask", default
 _stopwatch: ContextVar[Stopwatch | None] = ContextVar("coneflat_stopwatch", default=None)
 
 
+def rising(progress: Progress) -> Progress:
+    """Return a callback that reports the largest fraction so far, because searches begin several times."""
+    largest = 0.0
+
+    def report(text: str, fraction: float) -> None:
+        nonlocal largest
+        largest = max(largest, fraction)
+        progress(text, largest)
+
+    return report
+
+
+def as_part(progress: Progress, start: float, end: float) -> Progress:
+    """Return a callback that reports the progress of a part of the work, between two fractions of it."""
+    return lambda text, fraction: progress(text, start + (end - start) * fraction)
+
+
 @contextmanager
 def cancel_with(ask: Callable[[], None]) -> Iterator[None]:
     """Call `ask` every few milliseconds during long computations in the block, from any thread.

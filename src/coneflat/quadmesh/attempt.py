@@ -123,7 +123,7 @@ def rounded_map(request: GridRequest, seamless: SeamlessMap) -> IntegerGrid | No
         # Rather than many more squares than requested, a grid with other cones is searched.
         may_change_cones = seamless.is_aligned and request.sharp_angle is None
         rules = RoundingRules(
-            goal=GridGoal(request.energy, request.limit, request.loops),
+            goal=GridGoal(request.energy, request.limit, request.loops, 1 if request.mirror is None else 2),
             has_sides=flattening.settings.get("boundary") == "straight",
             requires_sides=seamless.requires_sides,
             sharp_angle=request.angle if follows_lines else None,

@@ -8,7 +8,7 @@ squares. With the integers of the separatrices that are joined so, others can be
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 from ..base import IntArray, Unmet
@@ -68,7 +68,7 @@ def grid_with_loops(rounding: Rounding, goal: GridGoal) -> IntegerGrid | NoGrid:
             continue
         nearer = _with_separatrices(rounding, coarse)
         grid = None if nearer is None or nearer.energy >= candidate.energy else nearer.grid(goal)
-        return replace(grid if isinstance(grid, IntegerGrid) else coarse, size=rounding.layout.size)
+        return grid if isinstance(grid, IntegerGrid) else coarse
     nearest = nearest_grid(rounding, goal)
     note = Unmet("Loops are as by default: no grid with shorter ones was found.")
     return with_note(nearest, note) if isinstance(nearest, IntegerGrid) else nearest

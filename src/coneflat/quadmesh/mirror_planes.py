@@ -16,6 +16,7 @@ from ..geometry.nearest import TriangleTree
 from ..mesh import tie_key
 from ..mesh.connectivity import TriangleMesh
 from .features import lengths_along
+from .surface_fit import MAX_ROWS, samples_in_rows
 
 # Largest distance of points of a symmetric surface from its mirror image, relative to its size: files have six digits
 # or more.
@@ -26,6 +27,8 @@ LEAST_SHARE, MAX_SAMPLES, NEAR_EDGES = 0.9, 256, 0.01
 # Where all vertices have images, points of triangles may be so far from the surface, in mean edge lengths: on spot,
 # whose quads are divided at other diagonals on both sides, 0.07.
 DIAGONAL_EDGES = 0.1
+# Sample points, about so many for the area of a surface, in triangles whose images are no triangles.
+SAMPLES_OF_AREA = 4000
 # Principal moments that differ by less, relative to the largest, determine no axes.
 EQUAL_MOMENTS = 1e-3
 # Largest number of vertices of a kind whose pairs are tried, and of such kinds.
@@ -226,23 +229,51 @@ class _Images:
     def is_symmetric(self, plane: MirrorPlane) -> bool:
         """Return whether the images of the vertices, and of points of triangles, are on the surface.
 
-        A triangle whose image is one needs no points. Where all vertices have images, only the diagonals of polygons
-        differ, and these points may be near the surface.
+        So are those of the boundary on the boundary, because a hole may be inside the image of a triangle. A triangle
+        whose image is one needs no points. Where all vertices have images, only the diagonals of polygons differ, and
+        these points may be near the surface.
         """
         mesh, tolerance = self.mesh, SAME_PLACE * self.size
+        if not self._has_symmetric_boundary(plane):
+            return False
         reflected = plane.reflected(mesh.vertices)
         _, image = self._vertices.query(reflected, distance_upper_bound=tolerance)
         has_image = image < len(image)
         is_paired = has_image[mesh.faces].all(axis=1)
         image_faces = np.sort(image[mesh.faces[is_paired]], axis=1)
         is_paired[is_paired] = _are_faces(image_faces, np.sort(mesh.faces, axis=1))
-        corners = reflected[mesh.faces[~is_paired]]
-        points = np.concatenate([corners, (corners + np.roll(corners, 1, axis=1)) / 2], axis=1).reshape(-1, 3)
         if has_image.all():
             tolerance = DIAGONAL_EDGES * self._edge
         elif not (self._distances(reflected[~has_image]) <= tolerance).all():
             return False
+        points = self._samples_of(reflected, mesh.faces[~is_paired])
         return not len(points) or bool((self._distances(points) <= tolerance).all())
+
+    def _has_symmetric_boundary(self, plane: MirrorPlane) -> bool:
+        """Return whether the images of the ends and middles of boundary edges are on boundary edges."""
+        ends = self.mesh.edges[self.mesh.is_boundary_edge]
+        if not len(ends):
+            return True
+        vertices = self.mesh.vertices
+        points = np.concatenate([vertices[np.unique(ends)], vertices[ends].mean(axis=1)])
+        images = plane.reflected(points)
+        # Each edge is a triangle without area.
+        faces = ends[:, [0, 1, 1]]
+        on, weights = TriangleTree(vertices, faces).nearest(images)
+        nearest = np.einsum("qi,qix->qx", weights, vertices[faces[on]])
+        return bool((np.linalg.norm(nearest - images, axis=1) <= SAME_PLACE * self.size).all())
+
+    def _samples_of(self, vertices: FloatArray, faces: IntArray) -> FloatArray:
+        """Return (s, 3) corners of triangles, middles of their sides, and points inside, the more the larger they are.
+
+        vertices: (n, 3) positions of the vertices of the surface.
+        """
+        corners = vertices[faces]
+        on_sides = np.concatenate([corners, (corners + np.roll(corners, 1, axis=1)) / 2], axis=1)
+        areas = double_areas(edge_lengths(vertices, self.mesh.faces)).sum()
+        shares = double_areas(edge_lengths(vertices, faces)) / max(float(areas), np.finfo(float).tiny)
+        rows = np.clip(np.ceil(np.sqrt(SAMPLES_OF_AREA * shares)), 1, MAX_ROWS).astype(np.int64)
+        return np.concatenate([on_sides.reshape(-1, 3), samples_in_rows(vertices, faces, rows)])
 
     def _distances(self, points: FloatArray) -> FloatArray:
         faces, weights = self._triangles.nearest(points)

@@ -5,16 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.spatial import cKDTree
 
-from ..base import BoolArray, IntArray, Unmet, mask_of, plural
+from ..base import BoolArray, FloatArray, IntArray, mask_of
 from ..errors import GridError
 from ..geometry import quarters_around, sides_between
 from ..io import as_input
 from ..mesh.connectivity import TriangleMesh, are_among
 from ..source import Source
-from .crease_fit import crease_fit
-from .cross_field import is_mechanical
 from .features import lengths_along, sharp_edges, split_edges
 from .integer_map import IntegerGrid, grid_of_corners, on_lines
 from .mirror_planes import SAME_PLACE, MirrorPlane, at_seam_ends, mirror_planes, on_seam, seam_edges
@@ -24,11 +21,9 @@ from .request import GridRequest, names_vertices
 from .simpler_mesh import nearest_on_edges
 from .smooth import blocked, is_on_feature, smooth_quads, square_corners
 
-# Largest ratio of the number of irregular vertices of symmetric quads to that of others, and of the factors by which
-# the numbers of quads differ from the requested one.
-MAX_WORSE = 1.1
-# Largest share of the length of sharp edges that others follow and symmetric quads do not.
-MAX_UNFOLLOWED = 0.02
+# Largest difference of the directions of a triangle at the plane and of the image of the one beyond, radians: where
+# polygons that are not plane have other diagonals on both sides, these differ.
+MAX_TURN = 0.3
 # Rounds of smoothing between those of the vertices on the plane.
 ROUNDS_AT_ONCE = 2
 
@@ -79,13 +74,42 @@ def _half_beside(mesh: TriangleMesh, plane: MirrorPlane) -> Half | None:
     heights = np.append(heights, np.zeros(len(ends)))
     is_half = heights[cut.faces].max(axis=1) > 0
     # Faces are numbered as before, but for the new vertices on the plane.
-    half, vertices = part_of(cut.moved_to(np.concatenate([points, middles])), is_half)
+    cut = cut.moved_to(np.concatenate([points, middles]))
+    half, vertices = part_of(cut, is_half)
     seam = seam_edges(half, plane)
-    if not len(seam):
+    if not len(seam) or not _meets_its_image(cut, heights, plane):
         return None
     every = np.arange(len(mesh.vertices))
     origins = np.concatenate([np.stack([every, every], axis=1), ends])[vertices]
     return Half(plane, half, origins, float(lengths_along(half, seam).sum()))
+
+
+def _meets_its_image(cut: TriangleMesh, heights: FloatArray, plane: MirrorPlane) -> bool:
+    """Return whether the triangles on both sides of each edge on the plane are images of each other.
+
+    Parts that cross the plane and each other there, of which each is the image of the other, have other halves.
+
+    Args:
+        cut: the surface, whose triangles do not cross the plane.
+        heights: (n,) the distances of its vertices from the plane.
+        plane: the plane.
+    """
+    halfedges = cut.edge_halfedges[(heights[cut.edges] == 0).all(axis=1) & ~cut.is_boundary_edge]
+    apexes = cut.faces.ravel()[halfedges]
+    crosses = heights[apexes].prod(axis=1) < 0
+    apexes, halfedges = apexes[crosses], halfedges[crosses]
+    tails, heads = (cut.vertices[ends] for ends in cut.ends_of(halfedges[:, 0]))
+    along = heads - tails
+    along = along / np.maximum(np.linalg.norm(along, axis=1), np.finfo(float).tiny)[:, None]
+    first, second = cut.vertices[apexes[:, 0]], plane.reflected(cut.vertices[apexes[:, 1]])
+    first, second = (
+        arms - np.einsum("ex,ex->e", arms, along)[:, None] * along for arms in (first - tails, second - tails)
+    )
+    lengths = [np.linalg.norm(arms, axis=1) for arms in (first, second)]
+    smallest = np.minimum(*lengths)
+    gaps = np.linalg.norm(first * lengths[1][:, None] - second * lengths[0][:, None], axis=1)
+    gaps /= np.maximum(np.maximum(*lengths), np.finfo(float).tiny)
+    return bool((gaps <= np.maximum(MAX_TURN * smallest, 4 * SAME_PLACE * plane.size)).all())
 
 
 def half_request(request: GridRequest) -> GridRequest | None:
@@ -113,43 +137,6 @@ def half_request(request: GridRequest) -> GridRequest | None:
         boundary="straight",
         mirror=half.plane.scaled(-checked.exponent),
     )
-
-
-def are_symmetric(quads: QuadMesh, plane: MirrorPlane) -> bool:
-    """Return whether the mirror images of all vertices of quads are vertices, up to rounding."""
-    gaps, images = cKDTree(quads.vertices).query(plane.reflected(quads.vertices))
-    return bool((gaps <= SAME_PLACE * plane.size).all()) and len(np.unique(images)) == len(images)
-
-
-def fault(symmetric: QuadMesh, quads: QuadMesh, request: GridRequest) -> str:
-    """Return why symmetric quads of a surface are worse than those without symmetry, "" if they are not."""
-    counts, numbers = (
-        [len(mesh.irregular) for mesh in (symmetric, quads)],
-        [len(symmetric.quads), len(quads.quads)],
-    )
-    if counts[0] > MAX_WORSE * counts[1]:
-        return f"they would have {plural(counts[0], 'irregular vertex', 'irregular vertices')} instead of {counts[1]:,}"
-    requested = request.limit.requested
-    ratios = [max(number / requested, requested / number) for number in numbers]
-    if ratios[0] > MAX_WORSE * ratios[1]:
-        return f"they would be {numbers[0]:,} instead of {numbers[1]:,}"
-    return _fault_at_creases(symmetric, quads, request)
-
-
-def _fault_at_creases(symmetric: QuadMesh, quads: QuadMesh, request: GridRequest) -> str:
-    """Return how much less symmetric quads follow sharp edges, "" if not, or if these need not be followed."""
-    if request.sharp_angle is None and not is_mechanical(request.mesh):
-        return ""
-    shares = [crease_fit(mesh, request.angle).share for mesh in (symmetric, quads)]
-    if shares[0] >= shares[1] - MAX_UNFOLLOWED:
-        return ""
-    percents = [f"{100 * share:.0f} %" for share in shares]
-    return f"{percents[0]} of the length of sharp edges would be on edges of quads instead of {percents[1]}"
-
-
-def asymmetry_note(plane: MirrorPlane, reason: str) -> Unmet:
-    """Return a note that a grid is not symmetric about a plane of its surface, and why."""
-    return Unmet(f"The quads are not symmetric about {plane}, as the surface is: {reason}.")
 
 
 @dataclass(frozen=True, eq=False)

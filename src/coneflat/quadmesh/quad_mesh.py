@@ -29,7 +29,8 @@ class QuadMesh:
     """A manifold quad mesh whose vertices lie on a triangle mesh.
 
     Attributes:
-        vertices: (q, 3) positions on the surface.
+        vertices: (q, 3) positions on the surface; those of symmetric quads of a surface whose polygons are divided at
+            other diagonals on both sides may be off it, by less than 0.1 edges of its triangles.
         quads: (p, 4) vertex indices, with the orientation of the surface.
         faces: (q,) the triangle of the surface that contains each vertex.
         barycentric: (q, 3) barycentric coordinates in this triangle.

@@ -25,15 +25,15 @@ from .cross_field import is_mechanical, sharp_ends
 from .extract import DegenerateQuads, extract_quads, find_quads
 from .integer_map import IntegerGrid
 from .limits import NO_LIMIT, NOTED_TIMES, SquareLimit
-from .mirrored import (
+from .mirror_choice import (
     are_symmetric,
     asymmetry_note,
-    doubled_grid,
-    doubled_quads,
     fault,
-    half_request,
-    smoothed_beside,
+    fault_of_angles,
+    on_given_surface,
+    topology_gap,
 )
+from .mirrored import doubled_grid, doubled_quads, half_request, smoothed_beside
 from .no_grid import REASONS, NoGrid, or_reason
 from .options import QuadOptions
 from .policies import find_grid, on_coarse_mesh
@@ -213,19 +213,21 @@ def _attempt(request: GridRequest, rounds: int) -> Attempt:
         half = half_request(request)
     if half is None or half.mirror is None:
         return _attempt_without_symmetry(request, rounds)
-    plain = or_reason(_attempt_without_symmetry)(request, rounds)
+    plain = or_reason(_attempt_without_symmetry)(request.as_part(0.0, 0.5), rounds)
     if not isinstance(plain, NoGrid) and not plain[1] and are_symmetric(plain[0], half.mirror):
         return plain
-    symmetric = _mirrored(request, half, rounds)
+    symmetric = _mirrored(request.as_part(0.5, 1.0), half.as_part(0.5, 1.0), rounds)
     if isinstance(plain, NoGrid):
-        if isinstance(symmetric, NoGrid):
+        if isinstance(symmetric, NoGrid) or topology_gap(symmetric):
             raise plain.error
         return symmetric, ()
     quad_mesh, problems = plain
     if isinstance(symmetric, NoGrid):
         reason = symmetric.reason
     else:
-        reason = "" if problems else fault(symmetric, quad_mesh, request)
+        reason = ""
+        if not problems:
+            reason = fault(symmetric, quad_mesh, request) or fault_of_angles(symmetric, quad_mesh)
         if not reason:
             return symmetric, ()
     return replace(quad_mesh, notes=(*quad_mesh.notes, asymmetry_note(half.mirror, reason))), problems
@@ -246,7 +248,10 @@ def _mirrored(request: GridRequest, half: GridRequest, rounds: int) -> QuadMesh 
     with request.stages("smooth"):
         quad_mesh = smoothed_beside(quad_mesh, half.mirror, rounds, features)
     symmetric = doubled_quads(quad_mesh, half.mirror, request.angle)
-    notes = *request.checked.notes, *symmetric.notes, f"The quads are symmetric about {half.mirror}."
+    checked = request.checked
+    surface = checked.mesh.moved_to(np.ldexp(checked.mesh.vertices, -checked.exponent))
+    symmetric = on_given_surface(symmetric, surface)
+    notes = *checked.notes, *symmetric.notes, f"The quads are symmetric about {half.mirror}."
     meshed = replace(meshed, quad_mesh=replace(symmetric, notes=notes), filled_area=2 * meshed.filled_area)
     quad_mesh, problems = _checked(request, meshed)
     return NoGrid(CoarseGridError("; ".join(problems))) if problems else quad_mesh
@@ -420,7 +425,8 @@ def integer_grid(
 def _symmetric_grid(request: GridRequest, half: GridRequest) -> Outcome:
     """Return the grid of a symmetric surface: a symmetric one, unless it is worse than another."""
     assert half.mirror is not None
-    plain, symmetric = find_grid(request), _mirrored_grid(request, half)
+    plain = find_grid(request.as_part(0.0, 0.5))
+    symmetric = _mirrored_grid(request, half.as_part(0.5, 1.0))
     if isinstance(plain, NoGrid):
         return plain if isinstance(symmetric, NoGrid) else symmetric
     if isinstance(symmetric, NoGrid):

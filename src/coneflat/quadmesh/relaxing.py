@@ -34,11 +34,13 @@ class GridGoal:
         energy: the energy of the map.
         limit: largest number of squares.
         loops: prefer integers for which few lines from irregular vertices go far, see `loops.py`.
+        parts: number of parts of the surface that will have this grid: two if it is that of a half.
     """
 
     energy: StretchEnergy
     limit: SquareLimit = NO_LIMIT
     loops: bool = False
+    parts: int = 1
 
 
 def relaxed_grid(

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..base import FloatArray, Stopwatch
+from ..base.progress import as_part, rising
 from ..errors import OptionError
 from ..geometry import double_areas, edge_lengths
 from ..io import as_input
@@ -94,6 +95,9 @@ class GridRequest:
         }
         parsed = read_options({**flattening_defaults(options), **free_options, **fixed_options}, Options)
         stages = Stopwatch(parsed.progress)
+        if parsed.progress is not None:
+            free_options["progress"] = rising(parsed.progress)
+            stages = Stopwatch(free_options["progress"])
         has_more = faces is not None or sizes is not None or chosen.sharp_angle is not None
         if flattening and (has_more or options.keys() - {"progress"}):
             raise OptionError("a flattening already has faces and options: no others can be given")
@@ -123,6 +127,16 @@ class GridRequest:
         size = min(max(size, MIN_SIZE * extent), MAX_SIZE * extent)
         squares = quads or (extent / size) ** 2
         return replace(self, size=size, limit=SquareLimit.of(squares, len(self.mesh.faces), extent))
+
+    def as_part(self, start: float, end: float) -> GridRequest:
+        """Return the request whose progress is that of a part of the work, between two fractions of it."""
+        progress = self.options.get("progress")
+        if progress is None:
+            return self
+        part = as_part(progress, start, end)
+        stages = Stopwatch(part)
+        stages.seconds = self.stages.seconds
+        return replace(self, options={**self.options, "progress": part}, stages=stages)
 
     def with_quads(self, quads: int) -> GridRequest:
         """Return the request for another number of quads."""

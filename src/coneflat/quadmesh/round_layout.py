@@ -123,7 +123,9 @@ def grid_about(rounding: Rounding, goal: GridGoal, doublings: int) -> IntegerGri
     for doubling in range(doublings + 1):
         grid = _rounded(rounding.scaled(2.0**doubling), goal)
         if isinstance(grid, IntegerGrid):
-            return _with_note_on_size(_corrected(rounding, grid, goal) if doubling == 0 else grid, requested)
+            return _with_note_on_size(
+                _corrected(rounding, grid, goal) if doubling == 0 else grid, requested, goal.parts
+            )
         if isinstance(grid.error, CoarseGridError):  # a finer one has even more squares
             return grid
         reason = grid.reason
@@ -131,12 +133,13 @@ def grid_about(rounding: Rounding, goal: GridGoal, doublings: int) -> IntegerGri
     return NoGrid(GridError(f"no grid of about {requested:,.0f} quads{finer} was found: {reason}"))
 
 
-def _with_note_on_size(grid: IntegerGrid, requested: float) -> IntegerGrid:
-    """Return a grid with a note if its number of squares is not about the requested one."""
+def _with_note_on_size(grid: IntegerGrid, requested: float, parts: int) -> IntegerGrid:
+    """Return a grid of each of some parts with a note if its number of squares is not about the requested one."""
     if abs(grid.squares - requested) <= NOTED_SHARE * requested:
         return grid
     return with_note(
-        grid, Unmet(f"The grid has an area of {grid.squares:,.0f} squares, not {requested:,.0f}.")
+        grid,
+        Unmet(f"The grid has an area of {parts * grid.squares:,.0f} squares, not {parts * requested:,.0f}."),
     )
 
 

@@ -25,6 +25,8 @@ MAX_DISTANCE = 2.0
 MAX_DETOUR = 4.0
 # A point that slides along the surface to the other end of a side has arrived if it is so near, in edges of the grid.
 ARRIVED = 0.25
+# Rows of sample points of a triangle.
+MAX_ROWS = 64
 # Suspect sides whose ways are measured; of more, so many are.
 MAX_MEASURED_SIDES = 500
 
@@ -165,11 +167,19 @@ def _detours(quads: QuadMesh, edges: IntArray, longest: float) -> FloatArray:
 
 
 def surface_samples(vertices: FloatArray, faces: IntArray, spacing: float) -> FloatArray:
-    """Return (s, 3) sample points of triangles: their vertices, and rows with a given spacing, at most 64 rows each."""
-    parts = [vertices[np.unique(faces)]]
+    """Return (s, 3) sample points of triangles: their vertices, and rows with a given spacing or `MAX_ROWS`."""
     longest = edge_lengths(vertices, faces).max(axis=1)
-    rows = np.minimum(np.ceil(longest / spacing), 64).astype(np.int64)
-    for count in np.unique(rows[rows > 1]):
+    rows = np.minimum(np.ceil(longest / spacing), MAX_ROWS).astype(np.int64)
+    is_long = rows > 1
+    return np.concatenate(
+        [vertices[np.unique(faces)], samples_in_rows(vertices, faces[is_long], rows[is_long])]
+    )
+
+
+def samples_in_rows(vertices: FloatArray, faces: IntArray, rows: IntArray) -> FloatArray:
+    """Return (s, 3) sample points of triangles, each in a number of rows (m,)."""
+    parts = [np.empty((0, 3))]
+    for count in np.unique(rows):
         i, j = np.indices((count, count)).reshape(2, -1)
         # Centroids of the small triangles with the orientation of the large one.
         u, v = ((x[i + j < count] + 1 / 3) / count for x in (i, j))
