@@ -116,11 +116,11 @@ def test_too_few_quads_for_a_maze_are_an_error_with_a_number_that_works(maze):
 
 @pytest.mark.parametrize("count", [600, 900])
 def test_a_layer_along_a_boundary_does_not_leap_across_gaps(maze, count):
-    from coneflat.quadmesh import quad_meshing
+    from coneflat.quadmesh import requested_quads
     from coneflat.quadmesh.request import GridRequest
 
     request = replace(GridRequest.of(*maze, {"quads": count}, {"boundary": "free"}), for_quads=True)
-    quads, _ = quad_meshing._attempt(request, 0)
+    quads, _ = requested_quads._attempt(request, 0)
     corners = quads.vertices[quads.quads]
     sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
     assert sides.max() < 2 * MAX_LAYER_WIDTH * sides.mean()
