@@ -200,7 +200,7 @@ def test_the_linear_metric_takes_the_cones_of_the_search():
         ({"cones": "greedy", "weights": np.ones(162)}, "weights is an option of cones 'sparse'"),
         ({"cones": [1, 2, 3], "required_cones": [5]}, "required_cones is an option"),
         ({"required_cones": {1: 0.5}}, "without curvatures"),
-        ({"min_cone_angle": "pi/2"}, "min_cone_angle must be a number"),
+        ({"min_cone_angle": "x"}, "min_cone_angle: .x. is not a valid angle"),
         ({"quantise": True}, "quantise must be a number"),
         ({"positive_only": "no"}, "True or False"),
         ({"weights": np.full(162, np.nan)}, "finite"),

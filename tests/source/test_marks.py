@@ -82,7 +82,7 @@ def test_seams_through_numbers_and_settings():
         ({"no_seams": [[0, 1, 2]]}, r"vertices \(k,\) or pairs of vertices \(k, 2\), got shape \(1, 3\)"),
         ({"no_seams": [0.5]}, "vertices .* and type float64"),
         ({"sharp_angle": 0}, "between 0 and pi"),
-        ({"sharp_angle": "x"}, "sharp_angle must be a number"),
+        ({"sharp_angle": "x"}, "sharp_angle: 'x' is not a valid angle"),
         ({"charts": "many"}, "unknown charts"),
     ],
 )

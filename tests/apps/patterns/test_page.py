@@ -95,7 +95,7 @@ def test_the_command_writes_only_the_page_if_nothing_else_is_asked_for(tmp_path,
     names = head["parts"]["seam_names"]
     assert names == list("ABCDEFG"[: len(names)])
     assert head["seams"] == 7  # edges of a cube
-    assert [row[0] for row in head["rows"]][:2] == ["pieces", "seams"]
+    assert [row[0] for row in head["rows"]][:3] == ["size", "pieces", "seams"]
     done = CliRunner().invoke(cli, [*run, "box.pdf"])
     assert isinstance(done.exception, UnknownFormatError)
     done = CliRunner().invoke(cli, [*run, "both.html", "-o", "both.svg"])
