@@ -16,7 +16,7 @@ from coneflat.optimise import StretchEnergy
 from coneflat.quadmesh.alignment import aligned
 from coneflat.quadmesh.extract import extract_quads
 from coneflat.quadmesh.integer_map import grid_of_corners
-from coneflat.quadmesh.loops import MAX_ENERGY, grid_with_loops, nearest_grid
+from coneflat.quadmesh.loops import MAX_ENERGY, SCALES, grid_with_loops, nearest_grid
 from coneflat.quadmesh.quad_mesh import opposite_sides
 from coneflat.quadmesh.relaxing import GridGoal
 from coneflat.quadmesh.rounding import find_rounding
@@ -116,7 +116,8 @@ def test_a_grid_with_short_loops_is_near_the_layout():
     rounding, goal = rounding_of(shapes.sphere(4), 2000), GridGoal(StretchEnergy(0.3))
     nearest, short = nearest_grid(rounding, goal), grid_with_loops(rounding, goal)
     assert find_separatrices(short).lengths.mean() < find_separatrices(nearest).lengths.mean() / 2
-    assert short.squares == pytest.approx(rounding.layout.area, rel=0.01)
+    scales = np.square(SCALES) * [0.99, *[1.0] * (len(SCALES) - 2), 1.01]  # relaxing changes areas a little
+    assert scales.min() <= short.squares / rounding.layout.area <= scales.max()
     assert not short.notes
     assert 0 < MAX_ENERGY < 0.1
 

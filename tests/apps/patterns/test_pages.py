@@ -188,3 +188,9 @@ def test_a_pattern_of_one_page_has_no_marks_for_joining():
     pages, _ = pages_of(nested(two_pieces(page="A3")))
     assert [text.text for text in pages[-1].drawing.texts] == ["toy"]
     assert not pages[-1].drawing.lines
+
+
+def test_cut_lines_that_cross_themselves_do_not_stop_tiling():
+    bow = np.array([[0.0, 0], [100, 0], [100, 100], [50, -1e-3], [0, 100]])
+    drawing = Drawing(110.0, 110.0, (Line("cut", bow + 5, is_closed=True),))
+    assert all(shape.is_valid for shape in cut_shapes(drawing))

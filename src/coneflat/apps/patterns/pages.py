@@ -88,9 +88,11 @@ def tiled(drawing: Drawing, paper: Paper, title: str) -> list[Page]:
 
 def cut_shapes(drawing: Drawing) -> list[Polygon]:
     """Return the polygons of the closed lines on the layer cut."""
-    return [
+    polygons = [
         shapely().Polygon(line.points) for line in drawing.lines if line.layer == "cut" and line.is_closed
     ]
+    # Rounded tips of narrow slits may cross: intersections with pages need simple polygons.
+    return [polygon if polygon.is_valid else polygon.buffer(0) for polygon in polygons]
 
 
 def _page(drawing: Drawing, tile: Tile, paper: Paper, count: int, title: str) -> Page:
