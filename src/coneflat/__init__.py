@@ -126,6 +126,7 @@ if TYPE_CHECKING:
         seams,
         stages,
     )
+    from .apps.patterns.making import pattern
     from .apps.patterns.result import Pattern
     from .apps.studio.notebook import studio
     from .apps.uv_measures import measure_uv

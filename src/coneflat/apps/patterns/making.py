@@ -50,7 +50,7 @@ def pattern(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Patter
 
     Examples:
         >>> result = coneflat.pattern(coneflat.sample_path(), height="200mm", strain="5%")
-        >>> abs(result.strains).max() <= 0.05, result.kind
+        >>> bool(abs(result.strains).max() <= 0.05), result.kind
         (True, 'cloth')
     """
     parsed = read_options(options, PatternOptions)

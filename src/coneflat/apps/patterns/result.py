@@ -39,6 +39,13 @@ class Pattern:
         tabs: tabs for glue, beside the pieces.
         notes: what could not be met, one sentence each.
         settings: the options.
+
+    Examples:
+        >>> corners = [[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]
+        >>> faces = [[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]]
+        >>> net = coneflat.pattern(corners, faces, kind="net", unit="cm")
+        >>> net.piece_count, len(net.seams), len(net.folds)
+        (1, 3, 3)
     """
 
     kind: str
