@@ -47,9 +47,11 @@ MIN_GAIN = 1e-3
 MAX_CORNER_ERROR = 0.25
 # Meshes of fewer triangles are split evenly.
 MIN_TRIANGLES = 60
-# Edges are split up to this length, relative to the root of the area, so often, in meshes of at most so many triangles.
+# Edges are split up to this length, relative to the root of the area, so often, in meshes of at most so many triangles
+# before, and about so many after.
 # Of six cylinders with caps that are fans, angles deviate by 2 to 3 degrees instead of 3 to 10, in the same time.
-MAX_EDGE, MAX_EDGE_SPLITS, MAX_TRIANGLES_TO_SPLIT = 0.1, 4, 2500
+MAX_EDGE, MAX_EDGE_SPLITS = 0.1, 4
+MAX_TRIANGLES_TO_SPLIT, MAX_SPLIT_TRIANGLES = 1100, 2500
 # Bounds of the area distortion. Below, areas would cost more than missing cones; above, nothing.
 MIN_DISTORTION, MAX_DISTORTION = 1e-3, 1e3
 # How often the cost of areas is doubled to meet the bound, and the bound for a distortion of 1: the log of the ratio of
@@ -117,7 +119,7 @@ def _with_places(mesh: TriangleMesh, is_split: bool, sharp_angle: float) -> Tria
     """Return a mesh with vertices where cones may be needed, with all edges split if `is_split`."""
     if is_split:
         mesh = split_around(mesh, mesh.faces)
-    if len(mesh.faces) >= MIN_TRIANGLES:
+    if MIN_TRIANGLES <= len(mesh.faces) <= MAX_TRIANGLES_TO_SPLIT:
         mesh = _without_long_edges(mesh)
     while len(mesh.faces) < MIN_TRIANGLES:  # on a sphere, a grid has at least eight cones
         mesh = split_around(mesh, mesh.faces)
@@ -133,7 +135,7 @@ def _without_long_edges(mesh: TriangleMesh) -> TriangleMesh:
     longest = MAX_EDGE * float(np.sqrt(double_areas(edge_lengths(mesh.vertices, mesh.faces)).sum() / 2))
     for _ in range(MAX_EDGE_SPLITS):
         is_long = lengths_along(mesh, np.arange(len(mesh.edges))) > longest
-        if len(mesh.faces) > MAX_TRIANGLES_TO_SPLIT or not is_long.any():
+        if len(mesh.faces) > MAX_SPLIT_TRIANGLES or not is_long.any():
             break
         mesh, _ = split_edges(mesh, is_long)
     return mesh

@@ -49,7 +49,10 @@ def _moved_onto(quads: QuadMesh, ends: IntArray, fixed: IntArray) -> QuadMesh:
     edges = edge_indices(surface, ends)
     is_near, on, weights = nearest_on_edges(surface, edges, surface.vertices, quads.vertices[movable], reach)
     vertices, faces, barycentric = quads.vertices.copy(), quads.faces.copy(), quads.barycentric.copy()
-    moves = movable[is_near]
+    # Components may touch, and edges of another one are not followed.
+    component = surface.components[1][surface.faces[:, 0]]
+    is_same = component[quads.faces[movable[is_near]]] == component[on]
+    moves, on, weights = movable[is_near][is_same], on[is_same], weights[is_same]
     faces[moves], barycentric[moves] = on, weights
     vertices[moves] = np.einsum("qi,qix->qx", weights, surface.vertices[surface.faces[on]])
     stays = blocked(quads.vertices, vertices, quads.quads)
