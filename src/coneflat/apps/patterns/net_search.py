@@ -25,6 +25,18 @@ HOT, CYCLE = 4.0, 10**8
 
 
 @compiled
+def keep_joined_pairs(work: Workspace, number: int) -> int:
+    """Keep those of the first pairs of `work.pairs` that `work.walk` does not separate, and return their number."""
+    remaining = 0
+    for i in range(number):
+        is_first = work.walk.place[work.owner[work.pairs[i, 0]]] >= 0
+        if is_first == (work.walk.place[work.owner[work.pairs[i, 1]]] >= 0):
+            work.pairs[remaining] = work.pairs[i]
+            remaining += 1
+    return remaining
+
+
+@compiled
 def untangle(
     faces: Faces,
     net: Placement,
@@ -80,12 +92,7 @@ def untangle(
         if chosen < 0:
             continue
         find_collisions(faces, net, work.walk, count, chosen, limit, work.space, work.added)
-        remaining = 0
-        for i in range(number):
-            is_first = work.walk.place[work.owner[work.pairs[i, 0]]] >= 0
-            if is_first == (work.walk.place[work.owner[work.pairs[i, 1]]] >= 0):
-                work.pairs[remaining] = work.pairs[i]
-                remaining += 1
+        remaining = keep_joined_pairs(work, number)
         work.pairs[remaining : remaining + least_added] = work.added[:least_added]
         number = remaining + least_added
         move_side(faces, net, count, cut, chosen, work)
@@ -114,13 +121,7 @@ def cut_collisions(faces: Faces, net: Placement, lengths: FloatArray, number: in
                 cut = hinge
         net.is_joined[cut] = False
         walk_joined(faces, net.is_joined, faces.hinge_faces[cut, 0], -1, work.walk)
-        remaining = 0
-        for i in range(number):
-            is_first = work.walk.place[work.owner[work.pairs[i, 0]]] >= 0
-            if is_first == (work.walk.place[work.owner[work.pairs[i, 1]]] >= 0):
-                work.pairs[remaining] = work.pairs[i]
-                remaining += 1
-        number = remaining
+        number = keep_joined_pairs(work, number)
 
 
 @compiled
