@@ -9,6 +9,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 from markers import ROOT, blocks, fill, fill_numbers
@@ -282,15 +283,10 @@ def convergence() -> str:
 
 def quads_table(measured: Measured, body: str) -> str:
     """Return the quality of quads with default options."""
-    made = dict[str, list[str] | None]()
-    for model in QUADS:
-        path = measured.path(model)
-        if path is None:
-            made[model] = None
-            continue
-        print(f"  quads of {model}", flush=True)
+
+    def row(model: str, path: Path) -> list[str]:
         m = coneflat.measure_quads(coneflat.quads(path))
-        made[model] = [
+        return [
             model,
             f"{m.quads:,}",
             f"{m.irregular}",
@@ -299,33 +295,43 @@ def quads_table(measured: Measured, body: str) -> str:
             f"{m.jacobian_mean:.3f}, {m.jacobian_min:.2f}",
             f"{m.hausdorff / m.edge_mean:.2f}",
         ]
+
     headings = (
         "model | quads | irregular vertices | angle deviation, degrees: mean, p95 | edge lengths, cv | "
         "scaled Jacobian: mean, minimum | distance, edges"
     )
-    return _table(headings, list(_row_of_each(QUADS, body, made)))
+    return _table(headings, _rows_of_quads(measured, body, "quads", row))
 
 
 def loops_table(measured: Measured, body: str) -> str:
     """Return strips and patches of quads, with default options and with short loops."""
-    made = dict[str, list[str] | None]()
-    for model in QUADS:
-        path = measured.path(model)
-        if path is None:
-            made[model] = None
-            continue
-        print(f"  loops of {model}", flush=True)
+
+    def row(model: str, path: Path) -> list[str]:
         long, short = (coneflat.measure_quads(coneflat.quads(path, loops=loops)) for loops in (False, True))
         pairs = [
             [f"{m.irregular}", f"{m.angle_mean:.1f}", f"{m.longest_strip / m.quads:.1f}", f"{m.patches:,}"]
             for m in (long, short)
         ]
-        made[model] = [model, *(", ".join(values) for values in zip(*pairs, strict=True))]
+        return [model, *(", ".join(values) for values in zip(*pairs, strict=True))]
+
     headings = (
         "model | irregular vertices: default, `--loops` | angle deviation, degrees | "
         "quads of the longest strip, relative to all | patches"
     )
-    return _table(headings, list(_row_of_each(QUADS, body, made)))
+    return _table(headings, _rows_of_quads(measured, body, "loops", row))
+
+
+def _rows_of_quads(
+    measured: Measured, body: str, name: str, row: Callable[[str, Path], list[str]]
+) -> list[list[str]]:
+    """Return the row of each model with quads; those of models that are not there remain as they are."""
+    made = dict[str, list[str] | None]()
+    for model in QUADS:
+        path = measured.path(model)
+        if path is not None:
+            print(f"  {name} of {model}", flush=True)
+        made[model] = None if path is None else row(model, path)
+    return list(_row_of_each(QUADS, body, made))
 
 
 #: Function for each table, of the measured models and the old table.
