@@ -101,7 +101,7 @@ def test_an_atlas_of_several_meshes():
 @pytest.mark.parametrize("sheet", [shapes.hill(8, 7), shapes.sphere(2)], ids=["hill", "sphere"])
 def test_a_doubled_surface_has_the_charts_of_two_sheets(sheet, turned, monkeypatch):
     # Whether a cut pays for packing may depend on rounding: the two sheets have equal areas.
-    monkeypatch.setattr("coneflat.textures.unwrapping.cut_for_packing", lambda layouts, *_: layouts)
+    monkeypatch.setattr("coneflat.textures.further_cuts.cut_for_packing", lambda layouts, *_: layouts)
     vertices, faces = sheet
     second = faces[:, ::-1] if turned else faces
     separate, shared = np.concatenate([faces, len(vertices) + second]), np.concatenate([faces, second])

@@ -11,7 +11,7 @@ import shapes
 from coneflat import unwrap
 from coneflat.geometry import double_areas, edge_lengths, triangle_energies
 from coneflat.mesh import label_faces
-from coneflat.textures import unwrapping as unwrap_module
+from coneflat.textures import cut_search, work
 
 KINDS = {
     "icosphere": shapes.sphere(2),
@@ -39,8 +39,8 @@ def crumbs(kinds, count: int, seed: int = 0):
 
 @pytest.fixture
 def every_part_is_minor(monkeypatch):
-    monkeypatch.setattr(unwrap_module, "MINOR_SHARE", 1.0)
-    monkeypatch.setattr(unwrap_module, "best_cut", lambda _: pytest.fail("a component is searched alone"))
+    monkeypatch.setattr(work, "MINOR_SHARE", 1.0)
+    monkeypatch.setattr(cut_search, "best_cut", lambda _: pytest.fail("a component is searched alone"))
 
 
 @pytest.mark.slow
@@ -70,7 +70,7 @@ def test_seams_are_as_short_as_when_components_are_cut_alone(monkeypatch):
         return np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum()
 
     alone = length()
-    monkeypatch.setattr(unwrap_module, "MINOR_SHARE", 1.0)
+    monkeypatch.setattr(work, "MINOR_SHARE", 1.0)
     assert length() < 1.15 * alone
 
 

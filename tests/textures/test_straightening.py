@@ -11,7 +11,7 @@ from stored_meshes import find_model
 import coneflat
 from coneflat import unwrap
 from coneflat.geometry import edge_lengths
-from coneflat.textures import unwrapping
+from coneflat.textures import further_cuts
 
 # Directions and distances of exactly straight sides, relative.
 EXACT = 1e-9
@@ -143,7 +143,7 @@ def test_flat_faces_that_taper_are_not_stretched_into_rectangles(taper):
 def test_free_forms_keep_their_layouts(monkeypatch):
     meshes = [shapes.sphere(3), shapes.torus(), shapes.hill()]
     results = [unwrap(*mesh) for mesh in meshes]
-    monkeypatch.setattr(unwrapping, "straightened", lambda model, candidate: candidate)
+    monkeypatch.setattr(further_cuts, "straightened", lambda model, candidate: candidate)
     for mesh, result in zip(meshes, results, strict=True):
         np.testing.assert_array_equal(result.uv, unwrap(*mesh).uv)
 

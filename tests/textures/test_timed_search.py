@@ -16,8 +16,7 @@ from coneflat.base import cancel_with
 from coneflat.base.search_time import SearchTime
 from coneflat.errors import OptionError
 from coneflat.options import read_options
-from coneflat.textures import UnwrapOptions, Unwrapper
-from coneflat.textures import unwrapping as unwrap_module
+from coneflat.textures import UnwrapOptions, Unwrapper, cut_search, work
 from coneflat.textures.candidates import CutModel
 from coneflat.textures.work import TIME_FOR_PACKING
 
@@ -106,8 +105,8 @@ def test_without_time_each_component_is_laid_out_once(reads, laid_out):
 
 
 def test_without_time_small_components_are_laid_out_together(reads, monkeypatch):
-    monkeypatch.setattr(unwrap_module, "MINOR_SHARE", 1.0)
-    monkeypatch.setattr(unwrap_module, "best_cut", lambda _: pytest.fail("a component is searched alone"))
+    monkeypatch.setattr(work, "MINOR_SHARE", 1.0)
+    monkeypatch.setattr(cut_search, "best_cut", lambda _: pytest.fail("a component is searched alone"))
     result = unwrap(*crumbs([shapes.sphere(2), shapes.torus()], 6), search_time=0)
     assert (result.distortion.flipped, result.distortion.overlapping_pairs) == (0, 0)
     assert time_notes(result)

@@ -20,7 +20,7 @@ from coneflat.io import as_input
 from coneflat.options import Options
 from coneflat.retries import lay_out_with_thick_triangles
 from coneflat.source import Source, coarse_component
-from coneflat.textures import unwrapping
+from coneflat.textures import cut_search
 from coneflat.textures.creases import along_sharp_edges
 from coneflat.textures.free_seams import freed
 from coneflat.textures.small_charts import join_small_charts
@@ -265,7 +265,7 @@ def test_charts_with_short_seams_are_cut_as_well(shared, name, coverage, most_ch
 def test_small_charts_are_joined_to_others_where_they_fit(shared, monkeypatch):
     path, bound = shared("spot.obj"), 4.02
     result = unwrap(path, max_energy=bound, packing_cuts=1)
-    monkeypatch.setattr("coneflat.textures.unwrapping.join_small_charts", lambda _, candidate: candidate)
+    monkeypatch.setattr("coneflat.textures.further_cuts.join_small_charts", lambda _, candidate: candidate)
     joined, apart = result.distortion, unwrap(path, max_energy=bound, packing_cuts=1).distortion
     assert joined.charts <= apart.charts - 2
     assert joined.seam_length < 0.99 * apart.seam_length
@@ -379,9 +379,9 @@ def test_the_search_for_a_loose_bound_on_a_coarse_mesh_tries_other_cones(shared,
 def test_small_charts_inside_another_one_are_joined(monkeypatch):
     """The second join closes edges of the third seam as well."""
     searches = []
-    best_cut = unwrapping.best_cut
+    best_cut = cut_search.best_cut
     monkeypatch.setattr(
-        unwrapping, "best_cut", lambda model: searches.append((model, best_cut(model))) or searches[-1][1]
+        cut_search, "best_cut", lambda model: searches.append((model, best_cut(model))) or searches[-1][1]
     )
     # A developable grid would not be searched.
     unwrap(*shapes.grid(40, 40, lambda x, y: 0.003 * np.cos(9 * x) * np.cos(9 * y)))

@@ -7,19 +7,19 @@ import pytest
 import shapes
 
 import coneflat
-from coneflat.textures import Unwrapper, unwrapping
+from coneflat.textures import Unwrapper, cut_search
 
 
 @pytest.fixture
 def searches(monkeypatch):
     """The components whose cuts are searched for, in turn."""
-    searched, best_cut = [], unwrapping.best_cut
+    searched, best_cut = [], cut_search.best_cut
 
     def counted(model):
         searched.append(model)
         return best_cut(model)
 
-    monkeypatch.setattr(unwrapping, "best_cut", counted)
+    monkeypatch.setattr(cut_search, "best_cut", counted)
     return searched
 
 

@@ -19,9 +19,11 @@ from ..mesh import label_faces
 from ..options import read_options
 from ..result import Flattening
 from ..source import Source
+from .cut_search import Searched, search_cuts
 from .fitting import square_side
+from .further_cuts import cut_to_pack
 from .options import MAX_TEXTURES, UnwrapOptions, options_of_stages
-from .unwrapping import Searched, cut_to_pack, pack_candidates, search_cuts
+from .unwrapping import pack_candidates
 
 #: Sides of charts that are tried, relative to that of a texture without its padding: charts may grow when seams move
 #: after cuts, and small charts are joined to them.

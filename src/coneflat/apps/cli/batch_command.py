@@ -13,21 +13,10 @@ import click
 from ...base import plural, printable
 from ...options import Options, declarations, read_options
 from ...textures import MAX_ENERGY, TextureOptions, UnwrapOptions
-from .flags import (
-    FORMAT_CHOICE,
-    GroupedCommand,
-    check_combinations,
-    flag,
-    flag_name,
-    input_options,
-    keywords,
-    option_flags,
-    paper_option,
-    path_flag,
-    pop_flags,
-    require_option,
-    verbosity_options,
-)
+from .checks import check_combinations
+from .flags import flag, flag_name, keywords, option_flags, path_flag, pop_flags
+from .grouped_help import GroupedCommand
+from .shared_flags import FORMAT_CHOICE, input_options, paper_option, require_option, verbosity_options
 
 if TYPE_CHECKING:
     from ..batch import BatchSummary

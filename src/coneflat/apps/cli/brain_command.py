@@ -10,8 +10,10 @@ import click
 
 from ...base import Use, endings, plural
 from ...options import ConeNumber, Direction, RunOptions, option, strength
-from .flags import GroupedCommand, flag, keywords, option_flags, path_flag, pop_flags, verbosity_options
+from .flags import flag, keywords, option_flags, path_flag, pop_flags
+from .grouped_help import GroupedCommand
 from .measure_command import rows_of_measures
+from .shared_flags import verbosity_options
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -12,17 +12,10 @@ import click
 
 from ...base import DISTORTION, MAX_CONES, plural
 from ...options import FindOptions
-from .flags import (
-    GroupedCommand,
-    flag,
-    input_options,
-    is_given,
-    keywords,
-    option_flags,
-    path_flag,
-    pop_flags,
-    verbosity_options,
-)
+from .checks import is_given
+from .flags import flag, keywords, option_flags, path_flag, pop_flags
+from .grouped_help import GroupedCommand
+from .shared_flags import input_options, verbosity_options
 
 if TYPE_CHECKING:
     from ... import ConeCurve

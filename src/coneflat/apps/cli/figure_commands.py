@@ -9,18 +9,13 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ...base import CHECKER_CELLS, DOTS_PER_INCH, MAX_CONES
-from .flags import (
+from .checks import is_given
+from .flag_values import parse_eye
+from .flags import flag, flag_name, option_flags, path_flag, pop_flags, repair_keywords
+from .shared_flags import (
     again_option,
     color_option,
-    flag,
-    flag_name,
     input_options,
-    is_given,
-    option_flags,
-    parse_eye,
-    path_flag,
-    pop_flags,
-    repair_keywords,
     up_option,
     verbosity_options,
 )

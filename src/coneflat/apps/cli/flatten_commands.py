@@ -11,24 +11,10 @@ import click
 
 from ...options import Options, declarations
 from ...textures import UnwrapOptions
-from .flags import (
-    FORMAT_CHOICE,
-    GroupedCommand,
-    check_combinations,
-    check_required,
-    flag,
-    flag_name,
-    input_options,
-    is_given,
-    keywords,
-    names_formats,
-    option_flags,
-    paper_option,
-    path_flag,
-    pop_flags,
-    require_option,
-    verbosity_options,
-)
+from .checks import check_combinations, check_required, is_given
+from .flags import flag, flag_name, keywords, option_flags, path_flag, pop_flags
+from .grouped_help import GroupedCommand, names_formats
+from .shared_flags import FORMAT_CHOICE, input_options, paper_option, require_option, verbosity_options
 
 if TYPE_CHECKING:
     from ... import Flattening

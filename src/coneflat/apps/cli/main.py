@@ -21,9 +21,9 @@ from ...base import Use, endings, inner_calls
 from .batch_command import batch
 from .blender_command import blender
 from .brain_command import brain
+from .checks import ExitCode
 from .cones_command import cones
 from .figure_commands import demo, figure
-from .flags import ExitCode
 from .flatten_commands import flatten, unwrap
 from .measure_command import measure
 from .pattern_command import pattern

@@ -8,15 +8,9 @@ from typing import TYPE_CHECKING
 
 import click
 
-from .flags import (
-    QUIET,
-    check_required,
-    input_options,
-    names_formats,
-    require_option,
-    uv_set_option,
-    verbosity_options,
-)
+from .checks import check_required
+from .grouped_help import names_formats
+from .shared_flags import QUIET, input_options, require_option, uv_set_option, verbosity_options
 
 if TYPE_CHECKING:
     from ...measures import Row

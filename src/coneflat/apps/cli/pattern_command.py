@@ -9,19 +9,10 @@ from typing import Any
 import click
 
 from ..patterns import PatternOptions
-from .flags import (
-    GroupedCommand,
-    check_required,
-    flag,
-    input_options,
-    keywords,
-    names_formats,
-    option_flags,
-    path_flag,
-    pop_flags,
-    require_option,
-    verbosity_options,
-)
+from .checks import check_required
+from .flags import flag, keywords, option_flags, path_flag, pop_flags
+from .grouped_help import GroupedCommand, names_formats
+from .shared_flags import input_options, require_option, verbosity_options
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -10,20 +10,10 @@ import click
 
 from ...options import ConeBounds, ConeNumber, declarations, read_options
 from ...quadmesh import QuadOptions
-from .flags import (
-    GroupedCommand,
-    check_required,
-    input_options,
-    is_given,
-    keywords,
-    names_formats,
-    option_flags,
-    path_flag,
-    pop_flags,
-    refuse,
-    require_option,
-    verbosity_options,
-)
+from .checks import check_required, is_given, refuse
+from .flags import keywords, option_flags, path_flag, pop_flags
+from .grouped_help import GroupedCommand, names_formats
+from .shared_flags import input_options, require_option, verbosity_options
 
 if TYPE_CHECKING:
     from ... import IntegerGrid, QuadMesh

@@ -24,7 +24,8 @@ from ...base import Progress as Listener
 from ...base import Stopwatch, printable
 from ...errors import OptionError
 from ...io import PIPE, Joined, as_written, atomic_write, has_uv, read_joined, write_measured, write_stream
-from .flags import QUIET, VERBOSE, repair_keywords
+from .flags import repair_keywords
+from .shared_flags import QUIET, VERBOSE
 
 if TYPE_CHECKING:
     from rich.progress import Progress

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from ...base import BAKED_RESOLUTION
-from .flags import uv_set_option, verbosity_options
+from .shared_flags import uv_set_option, verbosity_options
 
 if TYPE_CHECKING:
     from ..transfer import Baked

@@ -11,17 +11,14 @@ import click
 
 from ...base import printable
 from ...options import SHOWS
-from .flags import (
+from .flags import flag, option_flags, path_flag, pop_flags
+from .grouped_help import names_formats
+from .shared_flags import (
     QUIET,
     again_option,
     color_option,
-    flag,
     input_options,
     most_option,
-    names_formats,
-    option_flags,
-    path_flag,
-    pop_flags,
     up_option,
     verbosity_options,
 )

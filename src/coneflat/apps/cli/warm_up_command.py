@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import click
 
-from .flags import GroupedCommand, verbosity_options
+from .grouped_help import GroupedCommand
+from .shared_flags import verbosity_options
 
 
 @click.command(
