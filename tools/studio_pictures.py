@@ -52,7 +52,7 @@ ARROW = """
 SET, WAY = (0.55, 0.64), ((0.51, 0.61), (0.47, 0.58), (0.43, 0.54), (0.39, 0.50))
 CUT = ((0.30, 0.66), (0.62, 0.72))
 QUICK, SLOW, LAST = 350, 900, 2200  # Milliseconds of a frame.
-QUALITIES = (80, 65, 50, 35)
+QUALITIES = (65, 50, 35)
 
 
 class StudioPage(NamedTuple):
