@@ -1,6 +1,6 @@
 """Measures of a parameterization, reports and guarantees."""
 
-from .distortion import angle_sum_errors, mean_qc, measure, measure_map, quantile, sum_angles
+from .distortion import angle_sum_errors, mean_qc, measure, measure_map
 from .guarantees import undefined_measures, unmet_guarantees
 from .report import (
     FIRST_ROWS,
@@ -14,6 +14,8 @@ from .report import (
     path_text,
 )
 from .requirements import REPORTED, Requirement, breaches, parse_requirements
+from .triangles import sum_angles
+from .weighted import quantile
 
 __all__ = [
     "FIRST_ROWS", "MAP_MEASURES", "REPORTED", "Requirement", "Row", "SUMMARY_MEASURES", "angle_sum_errors", "as_rows",

@@ -3,27 +3,26 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..base.arrays import BoolArray, FloatArray, IntArray, as_faces, as_floats, dots
-from ..base.jit import compiled
+from ..base.arrays import BoolArray, FloatArray, IntArray, as_faces, as_floats
 from ..base.text import list_some, short_repr
 from ..errors import ArrayShapeError, NonFiniteError, OptionError
 from ..geometry import double_areas
 from ..geometry.intrinsic import check_lengths
 from ..geometry.overlap import Overlaps, overlaps_of_mesh
 from ..geometry.straight import place_triangles
-from ..mesh.charts import both_sides, joined_edges, label_charts
+from ..mesh.charts import joined_edges, label_charts
 from ..mesh.connectivity import TriangleMesh
 from ..stages import Layout
+from .seam_sides import seam_measures, seam_motion_mismatch
 from .strain import strain_of
-
-ZERO_AREA = 1e-12  # twice the area over the longest side squared; smaller ones are rounding errors
+from .triangles import measure_triangles, sum_angles
+from .weighted import quantile, quantiles, weighted_mean
 
 
 @dataclass(frozen=True, eq=False)
@@ -240,8 +239,8 @@ def measure_map(
         degenerate=int((has_area & ~has_uv_area).sum()),
         degenerate_input=int((~has_area).sum()),
         **_orientation_measures(mesh, joined, np.where(has_uv_area, uv_area, 0)),
-        **_seam_measures(mesh, corner_uv, seams, lengths, float(area.sum() / 2)),
-        seam_motion_mismatch=_seam_motion_mismatch(mesh, corner_uv, seams, cones),
+        **seam_measures(mesh, corner_uv, seams, lengths, float(area.sum() / 2)),
+        seam_motion_mismatch=seam_motion_mismatch(mesh, corner_uv, seams, cones),
         overlap=float("nan"),
         overlapping_pairs=0,
         curvature_error=curvature_error[0],
@@ -254,7 +253,7 @@ def mean_qc(layout: Layout) -> float:
     is_positive = np.isfinite(layout.qc)
     if not is_positive.any():
         return math.inf
-    return _mean(layout.qc[is_positive], double_areas(layout.lengths)[is_positive])
+    return weighted_mean(layout.qc[is_positive], double_areas(layout.lengths)[is_positive])
 
 
 def _scale_measures(
@@ -276,10 +275,10 @@ def _scale_measures(
     low, high = quantiles(scales, weights, (0.05, 0.95))
     return {
         "log_area_scale": log_area_scale,
-        "qc_mean": _mean(ratios, weights),
+        "qc_mean": weighted_mean(ratios, weights),
         "qc_p95": quantile(ratios, weights, 0.95),
         "qc_max": float(ratios.max()) if len(weights) else float("nan"),
-        "area_std": float(np.sqrt(_mean((scales - _mean(scales, weights)) ** 2, weights))),
+        "area_std": float(np.sqrt(weighted_mean((scales - weighted_mean(scales, weights)) ** 2, weights))),
         "energy": _symmetric_dirichlet(ratios, scales, weights),
         "density_spread": float(np.exp(high - low)),
     }
@@ -299,100 +298,11 @@ def _orientation_measures(mesh: TriangleMesh, joined: BoolArray, uv_area: FloatA
     return {"flipped": int(against.sum()), "charts": charts, "mirrored_charts": int((majority < 0).sum())}
 
 
-def _seam_measures(
-    mesh: TriangleMesh, corner_uv: FloatArray, seams: IntArray, lengths: FloatArray | None, area: float
-) -> dict[str, Any]:
-    """Return the length of the seams, and how much the lengths of their two sides differ.
-
-    Args:
-        mesh: the mesh.
-        corner_uv: (m, 3, 2) the UV point of every triangle corner.
-        seams: numbers of the seam edges.
-        lengths: (m, 3) side lengths of the metric that is mapped; None for the distances between the vertices.
-        area: area of the model.
-    """
-    seam_lengths, mismatches = _seam_mismatch(mesh, corner_uv, seams)
-    if lengths is not None:
-        seam_lengths = lengths.ravel()[mesh.edge_halfedges[seams, 0]]
-    return {
-        "seam_length": float(seam_lengths.sum() / np.sqrt(area)) if area > 0 else 0.0,
-        "seam_mismatch": _mean(mismatches, seam_lengths) if len(seams) else 0.0,
-        "seam_mismatch_max": float(mismatches.max()) if len(seams) else 0.0,
-    }
-
-
 def _symmetric_dirichlet(qc: FloatArray, log_scale: FloatArray, weights: FloatArray) -> float:
     """Return the mean symmetric Dirichlet energy at the best scale, from QC distortions and log conformal factors."""
     ratio = qc + 1 / qc
-    squares, inverses = (_mean(ratio * np.exp(sign * 2 * log_scale), weights) for sign in (1, -1))
+    squares, inverses = (weighted_mean(ratio * np.exp(sign * 2 * log_scale), weights) for sign in (1, -1))
     return 2 * float(np.sqrt(squares * inverses))
-
-
-def _side_lengths(ends: FloatArray) -> FloatArray:
-    side = ends[:, 1] - ends[:, 0]
-    return np.sqrt(dots(side, side))
-
-
-def _seam_mismatch(
-    mesh: TriangleMesh, corner_uv: FloatArray, seams: IntArray
-) -> tuple[FloatArray, FloatArray]:
-    """Return (k,) the length on the model of each seam edge, and (k,) the relative difference of its UV lengths."""
-    first, second = (_side_lengths(ends) for ends in both_sides(mesh, seams, corner_uv))
-    ends = mesh.vertices[mesh.edges[seams]]
-    return _side_lengths(ends), np.abs(first - second) / np.maximum(
-        (first + second) / 2, np.finfo(float).tiny
-    )
-
-
-def _seam_motion_mismatch(
-    mesh: TriangleMesh, corner_uv: FloatArray, seams: IntArray, cones: IntArray | None
-) -> float:
-    """Return the largest change of the rotation between the two sides of a seam along the seam, radians."""
-    sides, twin_sides = both_sides(mesh, seams, corner_uv)
-    first_step = (sides[:, 1] - sides[:, 0]) @ np.array([1, 1j])
-    second_step = (twin_sides[:, 1] - twin_sides[:, 0]) @ np.array([1, 1j])
-    # `sides` are those of the first half-edge, which may be either side of the seam. The rotation of each edge is
-    # from its left side to its right side, in the direction of its first half-edge.
-    rotation = first_step * np.conj(second_step)
-    rotation = rotation / np.maximum(np.abs(rotation), np.finfo(float).tiny)
-    starts, ends = mesh.ends_of(mesh.edge_halfedges[seams, 0])
-    degree = np.bincount(np.concatenate([starts, ends]), minlength=len(mesh.vertices))
-    passed = (degree == 2) & ~mesh.is_boundary_vertex
-    if cones is not None:
-        passed[cones] = False
-    # The two seam edges at each vertex that a seam passes, and whether each of them starts there.
-    at = np.concatenate([starts, ends])
-    leaves = np.repeat([True, False], len(seams))
-    edge = np.tile(np.arange(len(seams)), 2)
-    order = np.argsort(at, kind="stable")
-    order = order[passed[at[order]]].reshape(-1, 2)
-    if not len(order):
-        return 0.0
-    first, second = rotation[edge[order[:, 0]]], rotation[edge[order[:, 1]]]
-    # Two edges that both start or both end at the vertex have opposite directions; their left and right are exchanged.
-    opposed = leaves[order[:, 0]] == leaves[order[:, 1]]
-    change = np.where(opposed, first * second, first * np.conj(second))
-    return float(np.abs(np.angle(change)).max())
-
-
-def _mean(values: FloatArray, weights: FloatArray) -> float:
-    total = float(weights.sum())
-    return float((values * weights).sum() / total) if total > 0 else float("nan")
-
-
-def quantile(values: FloatArray, weights: FloatArray, fraction: float) -> float:
-    """Return the weighted quantile of values for a fraction from 0 to 1; NaN for empty arrays."""
-    return quantiles(values, weights, (fraction,))[0]
-
-
-def quantiles(values: FloatArray, weights: FloatArray, fractions: Sequence[float]) -> list[float]:
-    """Return the weighted quantiles of values for several fractions, see `quantile`."""
-    if not len(values):
-        return [float("nan")] * len(fractions)
-    order = np.argsort(values)
-    cumulated = np.cumsum(weights[order])
-    places = np.searchsorted(cumulated, np.array(fractions) * cumulated[-1])
-    return values[order[places]].tolist()
 
 
 def _place_separately(lengths: FloatArray) -> tuple[FloatArray, IntArray]:
@@ -403,89 +313,3 @@ def _place_separately(lengths: FloatArray) -> tuple[FloatArray, IntArray]:
     corners = np.stack([np.zeros(len(along)), along[:, 2], along[:, 2] + along[:, 0]], axis=1).ravel()
     positions = np.stack([corners.real, corners.imag, np.zeros(len(corners))], axis=1)
     return positions, np.arange(len(corners)).reshape(-1, 3)
-
-
-@compiled
-def measure_triangles(
-    vertices: FloatArray, faces: IntArray, corner_uv: FloatArray
-) -> tuple[FloatArray, BoolArray, FloatArray, BoolArray, FloatArray]:
-    """Return the areas of triangles on the model and in the plane, and their QC distortion.
-
-    Args:
-        vertices: (n, 3) positions.
-        faces: (m, 3).
-        corner_uv: (m, 3, 2).
-
-    Returns:
-        Five arrays (m,): twice the area on the model, whether it is nonzero, twice the signed area in the plane,
-        whether it is nonzero, and QC, the ratio of the singular values of the map, NaN where one of the areas is zero.
-    """
-    count = len(faces)
-    area, uv_area, ratio = np.empty(count), np.empty(count), np.empty(count)
-    has_area, has_uv_area = np.empty(count, np.bool_), np.empty(count, np.bool_)
-    first, second, normal = np.empty(3), np.empty(3), np.empty(3)
-    for f in range(count):
-        along, inner, across, opposite = 0.0, 0.0, 0.0, 0.0
-        for x in range(3):
-            start = vertices[faces[f, 0], x]
-            first[x], second[x] = vertices[faces[f, 1], x] - start, vertices[faces[f, 2], x] - start
-            along += first[x] * first[x]
-            inner += first[x] * second[x]
-            across += second[x] * second[x]
-            opposite += (second[x] - first[x]) ** 2
-        square = 0.0
-        for x in range(3):
-            y, z = (x + 1) % 3, (x + 2) % 3
-            normal[x] = first[y] * second[z] - first[z] * second[y]
-            square += normal[x] * normal[x]
-        area[f] = math.sqrt(square)
-        has_area[f] = area[f] > ZERO_AREA * max(along, across, opposite)
-        u1, v1 = corner_uv[f, 1, 0] - corner_uv[f, 0, 0], corner_uv[f, 1, 1] - corner_uv[f, 0, 1]
-        u2, v2 = corner_uv[f, 2, 0] - corner_uv[f, 0, 0], corner_uv[f, 2, 1] - corner_uv[f, 0, 1]
-        uv_area[f] = u1 * v2 - v1 * u2
-        longest = max(u1 * u1 + v1 * v1, u2 * u2 + v2 * v2, (u2 - u1) ** 2 + (v2 - v1) ** 2)
-        has_uv_area[f] = abs(uv_area[f]) > ZERO_AREA * longest
-        ratio[f] = np.nan
-        if has_area[f] and has_uv_area[f]:
-            # (x1, y1) and (x2, y2) are the images of two orthonormal vectors, the first along the first side.
-            base = math.sqrt(along)
-            height = area[f] / base
-            x1, y1 = u1 / base, v1 / base
-            x2, y2 = (u2 - x1 * inner / base) / height, (v2 - y1 * inner / base) / height
-            larger = (math.hypot(x1 + y2, y1 - x2) + math.hypot(x1 - y2, y1 + x2)) / 2
-            # The smaller singular value follows from the determinant; a difference would suffer from cancellation.
-            smaller = abs(uv_area[f]) / area[f] / larger
-            ratio[f] = max(larger / smaller, 1.0)
-    return area, has_area, uv_area, has_uv_area, ratio
-
-
-@compiled
-def sum_angles(faces: IntArray, corner_uv: FloatArray, count: int) -> tuple[FloatArray, FloatArray]:
-    """Return (n,) the sum of the angles around each vertex in the plane, and (n,) its sensitivity to rounding.
-
-    Angles are unsigned, so a vertex around which the triangles wind twice has 4 pi. Corners at a side of zero length
-    have no angle. The sensitivity is in radians per unit of displacement of the points, infinite at such corners.
-
-    Args:
-        faces: (m, 3) indices of the vertices, or of other items for which angles are summed.
-        corner_uv: (m, 3, 2).
-        count: n.
-    """
-    sums, change = np.zeros(count), np.zeros(count)
-    u, v, length = np.empty(3), np.empty(3), np.empty(3)
-    for f in range(len(faces)):
-        for i in range(3):  # the sides from each corner to the next
-            u[i] = corner_uv[f, (i + 1) % 3, 0] - corner_uv[f, i, 0]
-            v[i] = corner_uv[f, (i + 1) % 3, 1] - corner_uv[f, i, 1]
-            length[i] = math.hypot(u[i], v[i])
-            if length[i] > 0.0:
-                # Unit vectors avoid underflow and overflow in the products.
-                u[i], v[i] = u[i] / length[i], v[i] / length[i]
-        for i in range(3):
-            before = (i + 2) % 3
-            change[faces[f, i]] += 1.0 / length[i] + 1.0 / length[before]
-            if length[i] > 0.0 and length[before] > 0.0:
-                across = u[i] * v[before] - v[i] * u[before]
-                along = -(u[i] * u[before] + v[i] * v[before])
-                sums[faces[f, i]] += abs(math.atan2(across, along))
-    return sums, change
