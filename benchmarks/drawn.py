@@ -14,6 +14,10 @@ from scipy.spatial import cKDTree
 ENTITY, LAYER, LINE_TYPE, FLAGS, X, Y = 0, 8, 6, 70, 10, 20
 #: Flag of closed polylines.
 CLOSED = 1
+#: Encoding of files of this version of DXF; characters that it lacks are escaped.
+ENCODING = "cp1252"
+#: Area of overlaps that can be neglected, relative to that of an outline.
+NEGLIGIBLE = 1e-9
 #: Distance up to which a point of the file is a point of the pattern, mm.
 TOLERANCE = 0.005
 
@@ -30,7 +34,7 @@ class DrawnLine:
 
 def dxf_lines(path: Path) -> list[DrawnLine]:
     """Return the polylines of a DXF file."""
-    lines = path.read_text(encoding="utf-8").splitlines()
+    lines = path.read_text(encoding=ENCODING).splitlines()
     groups = [(int(code), value.strip()) for code, value in zip(lines[::2], lines[1::2], strict=True)]
     starts = [i for i, (code, _) in enumerate(groups) if code == ENTITY]
     entities = (groups[start:end] for start, end in pairwise([*starts, len(groups)]))
@@ -94,10 +98,18 @@ def triangle_strains(
 
 
 def overlapping(lines: Sequence[DrawnLine]) -> int:
-    """Return the number of outlines that intersect themselves, and of pairs of outlines that overlap."""
+    """Return the number of outlines that overlap themselves, and of pairs of outlines that overlap.
+
+    They may touch, as tabs do in narrow gaps.
+    """
     import shapely
 
     areas = [shapely.Polygon(line.points) for line in lines if line.layer == "cut" and line.is_closed]
-    invalid = sum(not area.is_valid for area in areas)
-    first, second = shapely.STRtree(areas).query(areas, predicate="overlaps")
-    return invalid + int((first < second).sum())
+    # What is inside twice counts twice in the area of an outline, and not at all in that of the valid one.
+    valid = [shapely.make_valid(area) for area in areas]
+    itself = sum(
+        abs(area.area - repaired.area) > NEGLIGIBLE * area.area
+        for area, repaired in zip(areas, valid, strict=True)
+    )
+    first, second = shapely.STRtree(valid).query(valid, predicate="overlaps")
+    return itself + int((first < second).sum())

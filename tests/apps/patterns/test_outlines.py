@@ -255,7 +255,6 @@ def test_slits_beside_tabs_are_cut():
             if line.layer in ("cut", "fold")
         ]
     )
-    assert sum(len(shape.slits) for shape in shapes_of(pattern)) == 3
     for side in (side for seam in pattern.seams for side in seam.sides):
         ends = pattern.surface.points[side.points]
         assert shapely.distance(shapely.points((ends[1:] + ends[:-1]) / 2), cut).max() < 1e-4

@@ -8,7 +8,9 @@ from test_net import rough
 
 from coneflat import TriangleMesh
 from coneflat.apps.patterns.borders import find_borders
+from coneflat.apps.patterns.finish import Finish
 from coneflat.apps.patterns.net import unfold_net
+from coneflat.apps.patterns.shapes import fold_of_tab, piece_shapes
 from coneflat.apps.patterns.tabs import glue_tabs
 
 SOLIDS = {"cube": cube, "dodecahedron": dodecahedron, "icosahedron": icosahedron, "prism": lambda: prism(9)}
@@ -64,12 +66,36 @@ def test_tabs_of_a_rough_model_do_not_collide():
 
 def test_tabs_without_room_are_counted():
     _, borders, tabs = tabs_of(prism(60), 100.0, 30.0)
-    assert len(tabs.lengths_without) >= 60
+    # The bases are glued to faces that are 5 mm wide, with tabs from a quarter of the width.
+    assert len(tabs.lengths_without) > 10
     parts = sum(len(seam.sides[0].halfedges) for seam in borders.seams)
     assert len(tabs.tabs) + len(tabs.lengths_without) == parts
     (note,) = tabs.notes
     assert f"{len(tabs.lengths_without)} of {parts} glue tabs have no room" in note
     assert f"{tabs.lengths_without.max():.1f} mm" in note
+
+
+def test_sides_shorter_than_a_tab_is_wide_have_tabs():
+    surface, _, tabs = tabs_of(icosahedron(), 6.5, 8.0)
+    assert surface.edges.lengths.max() == pytest.approx(4.0, abs=0.1)
+    assert not len(tabs.lengths_without)
+    assert_free(surface, tabs)
+
+
+def test_outlines_with_tabs_have_the_exact_corners_of_the_net():
+    surface, borders, tabs = tabs_of(rough(), 200.0, 6.0)
+    shapes = piece_shapes(surface, borders, Finish(), tabs.tabs)
+    folds = [fold_of_tab(surface, borders, tab) for tab in tabs.tabs]
+    drawn = np.concatenate([*(ring for shape in shapes for ring in shape.cut_rings), *folds])
+    corners = surface.points[
+        np.unique(np.concatenate([side.points for seam in borders.seams for side in seam.sides]))
+    ]
+    assert (corners[:, None] == drawn).all(axis=2).any(axis=1).all()
+    for piece, shape in enumerate(shapes):
+        # Nothing is inside twice.
+        area = sum(shapely.Polygon(ring).area for ring in shape.cut_rings)
+        tabs_of_piece = sum(shapely.Polygon(tab.polygon).area for tab in tabs.tabs if tab.piece == piece)
+        assert area == pytest.approx(shape.inside.area + tabs_of_piece, rel=1e-6)
 
 
 def test_width_zero_is_without_tabs():

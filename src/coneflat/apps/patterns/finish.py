@@ -15,6 +15,8 @@ from .units import length_of
 SEWN = ("cloth", "gores")
 #: Width of the seam allowance of sewn patterns, mm, and the name under which hems get another one.
 ALLOWANCE, HEM = 7.0, "hem"
+#: Largest width of an allowance, mm; a larger one is given in a wrong unit.
+MAX_ALLOWANCE = 500.0
 
 
 @dataclass(frozen=True)
@@ -77,13 +79,18 @@ def read_allowances(text: str) -> dict[str, float]:
     Raises:
         OptionError: the text is different.
     """
-    widths = {}
+    widths: dict[str, float] = {}
     for word in filter(None, (word.strip() for word in text.split(","))):
         name, is_split, value = word.partition("=")
         width = length_of(value) if is_split else None
-        if width is None or width < 0 or not name.strip():
+        if width is None or not 0 <= width <= MAX_ALLOWANCE or not name.strip():
             raise OptionError(
-                f"seam_allowances must be names of seams with lengths, such as A=10mm,B=0, got {short_repr(word)}"
+                f"seam_allowances must be names of seams with lengths up to {MAX_ALLOWANCE:g} mm, such as A=10mm,B=0, "
+                f"got {short_repr(word)}"
             )
-        widths[name.strip()] = width
+        if widths.setdefault(name.strip(), width) != width:
+            raise OptionError(
+                f"seam_allowances gives the seam {name.strip()} two widths, {widths[name.strip()]:g} and {width:g} mm: "
+                "leave out one of them"
+            )
     return widths

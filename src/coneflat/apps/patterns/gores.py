@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,10 +16,13 @@ from .cut_surface import CutSurface
 from .development import Development
 from .half_planes import AroundAxis
 from .relaxing import least_strained
+from .units import text_of_direction
 
 # Digits of radii and keys by which the vertex of the first half-plane is chosen: rounding errors are smaller.
 DIGITS = 7
 
+# Strain above which a note says so: cloth, paper and sheets are rarely stretched by more.
+NOTED_STRAIN = 0.05
 # Difference of the heights of the two ends of a strip, relative to the extent, up to which neither is the upper one.
 LEVEL = 1e-6
 
@@ -38,14 +42,26 @@ def cut_gores(mesh: TriangleMesh, count: int, axis: FloatArray) -> Development:
     Raises:
         MeshError: a strip between two half-planes is not a disk.
     """
-    strips = _Strips.of(mesh, count, np.asarray(axis, dtype=float))
+    axis = np.asarray(axis, dtype=float)
+    strips = _Strips.of(mesh, count, axis)
     sectors = strips.sector[strips.mesh.edge_faces]
     is_seam = ~strips.mesh.is_boundary_edge & (sectors[:, 0] != sectors[:, 1])
     closed = CutSurface(strips.mesh, strips.mesh.faces, np.zeros((len(strips.mesh.vertices), 2)))
     flat = closed.cut_along(np.flatnonzero(is_seam))
     _check_strips(flat, strips)
     flat = least_strained(_laid_out(flat))
-    return Development(replace(flat, points=_upright(flat, strips)))
+    notes = tuple(_notes_on_strain(flat, strips))
+    return Development(replace(flat, points=_upright(flat, strips)), notes=notes)
+
+
+def _notes_on_strain(flat: CutSurface, strips: _Strips) -> Iterator[str]:
+    """Yield a sentence if lengths change by more than most materials stretch."""
+    strain = float(np.abs(flat.edges.strains(flat.points)).max())
+    if strain > NOTED_STRAIN:
+        yield (
+            f"lengths of {strips.count} gores around the axis {text_of_direction(strips.axis)} change by up to "
+            f"{100 * strain:.2g} %: more gores, another axis, or kind cloth change them less"
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,12 +73,14 @@ class _Strips:
         around: the same in coordinates around the axis.
         sector: (m,) the sector of each triangle.
         count: the number of sectors.
+        axis: (3,) direction of the axis.
     """
 
     mesh: TriangleMesh
     around: AroundAxis
     sector: IntArray
     count: int
+    axis: FloatArray
 
     @classmethod
     def of(cls, mesh: TriangleMesh, count: int, axis: FloatArray) -> _Strips:
@@ -76,7 +94,19 @@ class _Strips:
         vertices = centre + around.vertices @ frame
         turns = _turns(around.vertices[around.faces].mean(axis=1))
         return cls(
-            TriangleMesh(vertices, around.faces), around, np.floor(turns * count).astype(int) % count, count
+            TriangleMesh(vertices, around.faces),
+            around,
+            np.floor(turns * count).astype(int) % count,
+            count,
+            axis,
+        )
+
+    @property
+    def requirement(self) -> str:
+        """What surfaces must be like, and what to do otherwise, for errors."""
+        return (
+            f"gores need a surface around the axis, here {text_of_direction(self.axis)}, like a ball, a vase or a lamp "
+            "shade; give another axis, or choose kind cloth"
         )
 
     def plane_of(self, edges: IntArray) -> IntArray:
@@ -110,15 +140,15 @@ def _check_strips(flat: CutSurface, strips: _Strips) -> None:
         parts = len(np.unique(flat.pieces[faces]))
         if parts != 1:
             raise MeshError(
-                f"strip {number + 1} of {count} consists of {plural(parts, 'piece')} instead of one: gores need a "
-                f"surface around the axis, like a ball, a vase or a lamp shade; choose another axis, or cloth"
+                f"strip {number + 1} of {count} consists of {plural(parts, 'piece')} instead of one: "
+                f"{strips.requirement}"
             )
         edges = pieces.halfedge_edges.reshape(-1, 3)[faces]
         euler = len(np.unique(flat.corners[faces])) - len(np.unique(edges)) + len(faces)
         if euler != 1:
             raise MeshError(
-                f"strip {number + 1} of {count} is not a disk but has Euler characteristic {euler}: gores need a "
-                f"surface around the axis, like a ball, a vase or a lamp shade; choose another axis, or cloth"
+                f"strip {number + 1} of {count} is not a disk but has Euler characteristic {euler}: "
+                f"{strips.requirement}"
             )
 
 
@@ -149,7 +179,7 @@ def _upright(flat: CutSurface, strips: _Strips) -> FloatArray:
     for number in range(strips.count):
         is_inside = strips.sector[sides // 3] == number
         seams = [
-            _ends_of_path(flat, sides[is_inside & (plane == bound % strips.count)])
+            _ends_of_path(flat, sides[is_inside & (plane == bound % strips.count)], strips)
             for bound in (number, number + 1)
         ]
         bottom, top = _middles(flat, seams, strips.around.vertices)
@@ -161,15 +191,14 @@ def _upright(flat: CutSurface, strips: _Strips) -> FloatArray:
     return points
 
 
-def _ends_of_path(flat: CutSurface, sides: IntArray) -> IntArray:
+def _ends_of_path(flat: CutSurface, sides: IntArray, strips: _Strips) -> IntArray:
     """Return (2, 2) the vertex and the point at both ends of a path of half-edges."""
     corner = np.stack([3 * (sides // 3) + (sides + step) % 3 for step in (1, 2)])
     corners, counts = np.unique(flat.corners.ravel()[corner], return_counts=True)
     ends = corners[counts == 1]
     if len(ends) != 2:
         raise MeshError(
-            f"a seam between two gores has {plural(len(ends), 'end')} instead of two: gores need a surface around the "
-            f"axis, like a ball, a vase or a lamp shade; choose another axis, or cloth"
+            f"a seam between two gores has {plural(len(ends), 'end')} instead of two: {strips.requirement}"
         )
     return np.stack([flat.vertex_of_point[ends], ends], axis=1)
 

@@ -19,12 +19,14 @@ from ...source import InputMesh, marked_edges
 from ..view import upward_axis
 from .degenerate import without_degenerate
 from .options import PatternOptions
-from .units import MILLIMETRES, text_of_size
+from .units import MILLIMETRES, text_of_direction, text_of_size
 
 #: Units of formats whose specification gives one.
 FORMAT_UNITS = {".glb": "m", ".gltf": "m"}
 # Largest extent of a model, mm; a larger one has another unit.
 LARGEST = 1e6
+# Extent of flat models along an axis, relative to the largest one.
+FLAT = 1e-9
 AXES: Mapping[str, FloatArray] = dict(zip("xyz", np.eye(3), strict=True))
 
 
@@ -58,9 +60,10 @@ def read_model(mesh: Any, faces: ArrayLike | None, options: PatternOptions) -> M
     checked = check_mesh(source.vertices, source.faces, repair=options.repair)
     vertices = checked.mesh.vertices
     ending = "" if source.source is None else source.source.path.suffix.lower()
-    axis = AXES[upward_axis(vertices, checked.mesh.faces, ending)]
     if options.axis is not None:
         axis = np.array(options.axis) / np.linalg.norm(options.axis)
+    else:
+        axis = _guessed_axis(vertices, checked.mesh.faces, ending)
     factor, notes = _millimetres(vertices, axis, ending, options)
     extents = np.ptp(vertices, axis=0) * factor
     if extents.max() > LARGEST:
@@ -79,6 +82,15 @@ def read_model(mesh: Any, faces: ArrayLike | None, options: PatternOptions) -> M
     return Model(sound, axis, factor, _own_seams(source, checked, options), (*checked.notes, *notes))
 
 
+def _guessed_axis(vertices: FloatArray, faces: IntArray, ending: str) -> FloatArray:
+    """Return the axis (3,) that most probably points up; for a flat model, one in which it extends."""
+    name = upward_axis(vertices, faces, ending)
+    extents = dict(zip(AXES, np.ptp(vertices, axis=0).tolist(), strict=True))
+    if extents[name] <= FLAT * max(extents.values()):
+        name = max("yzx", key=lambda axis: extents[axis] > FLAT * max(extents.values()))
+    return AXES[name]
+
+
 def _own_seams(source: InputMesh, checked: CheckedMesh, options: PatternOptions) -> IntArray | None:
     """Return (k, 2) the vertices of the edges that the options name as seams; None if they name none."""
     if options.seams is None:
@@ -94,9 +106,10 @@ def _millimetres(
     """Return millimetres per unit of a model, and notes on what was assumed."""
     if options.height is not None:
         extent = float(np.ptp(vertices @ axis))
-        if not extent > 0:
+        if extent <= FLAT * np.ptp(vertices, axis=0).max():
             raise OptionError(
-                "height needs a model with a height, but its extent along the axis is 0: give a unit"
+                f"height needs a model with a height, but its extent along the axis {text_of_direction(axis)} is 0: "
+                "give another axis, or a unit instead of a height"
             )
         return options.height / extent, ()
     extents = np.ptp(vertices, axis=0)

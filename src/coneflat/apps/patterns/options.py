@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from ...errors import OptionError
 from ...options import Choice, Direction, Edges, Number, RunOptions, declarations, option
-from .finish import Allowances
+from .finish import MAX_ALLOWANCE, Allowances
 from .papers import PaperName
 from .units import MILLIMETRES, Length, Percentage
 
@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
 KINDS = ("cloth", "net", "gores", "sheet")
+#: Largest number of gores: more would be narrower than their allowances.
+MAX_GORES = 200
 #: Options that only one kind has.
 OWN_OPTIONS = {
     "cloth": ("strain", "stretch_warp", "stretch_weft", "darts", "seams", "tolerance"),
@@ -60,9 +62,9 @@ class PatternOptions(RunOptions):
     darts: str = option("auto", Choice(("auto", "none")))
     seams: ArrayLike | str | None = option(None, Edges(("input",)), one_mesh=True)
     tolerance: float = option(0.5, Length())
-    gores: int = option(12, Number(2, 1000, is_integer=True))
+    gores: int = option(12, Number(2, MAX_GORES, is_integer=True))
     axis: tuple[float, float, float] | None = option(None, Direction())
-    allowance: float | None = option(None, Length(optional=True))
+    allowance: float | None = option(None, Length(optional=True, maximum=MAX_ALLOWANCE))
     seam_allowances: str = option("", Allowances())
     corners: str = option("mitred", Choice(("mitred", "round")))
     tabs: float = option(8.0, Length())

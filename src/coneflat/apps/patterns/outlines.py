@@ -17,7 +17,7 @@ from .papers import EDGE
 from .piece_texts import add_angle, add_grain, add_number, add_seam_name
 from .result import Pattern
 from .seam_names import names_of
-from .shapes import PieceShape, piece_shapes
+from .shapes import PieceShape, fold_of_tab, piece_shapes
 
 # Dashes and gaps, mm: seam lines, folds away from the eye (mountains) and towards it (valleys).
 SEAM_DASHES, MOUNTAIN, VALLEY = (4.0, 2.0), (7.0, 1.5, 1.0, 1.5), (4.0, 2.5)
@@ -91,7 +91,6 @@ class Rooms:
 def _cut_lines(shapes: Sequence[PieceShape]) -> Iterator[Line]:
     for shape in shapes:
         yield from (Line("cut", ring, is_closed=True) for ring in shape.cut_rings)
-        yield from (Line("cut", slit) for slit in shape.slits)
 
 
 def _seam_lines(pattern: Pattern, finish: Finish) -> Iterator[Line]:
@@ -103,7 +102,8 @@ def _seam_lines(pattern: Pattern, finish: Finish) -> Iterator[Line]:
 
 
 def _tab_folds(pattern: Pattern) -> Iterator[Line]:
-    return (Line("fold", tab.polygon[[0, -1]], dashes=MOUNTAIN) for tab in pattern.tabs)
+    for tab in pattern.tabs:
+        yield Line("fold", fold_of_tab(pattern.surface, pattern.borders, tab), dashes=MOUNTAIN)
 
 
 def _folds(pattern: Pattern) -> Iterator[Line]:

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from ...base import FloatArray, IntArray
 from .allowances import GRID, polygon_of, united, widened
@@ -29,21 +28,15 @@ class PieceShape:
         inside: what its borders enclose.
         cut: what is cut out: the piece with seam allowances and tabs.
         is_wider: whether it has any.
-        slits: the lines (2, 2) inside `cut` along which the piece touches itself.
+        cut_rings: the lines (k, 2) along which it is cut, without repeated ends. Tabs may touch the piece and each
+            other there, and are cut apart.
     """
 
     seam_rings: tuple[FloatArray, ...]
     inside: Polygon
     cut: Polygon
     is_wider: bool
-    slits: tuple[FloatArray, ...] = ()
-
-    @property
-    def cut_rings(self) -> tuple[FloatArray, ...]:
-        """The lines (k, 2) along which it is cut, without repeated ends."""
-        if not self.is_wider:
-            return self.seam_rings
-        return tuple(np.asarray(ring.coords)[:-1] for ring in (self.cut.exterior, *self.cut.interiors))
+    cut_rings: tuple[FloatArray, ...]
 
 
 def piece_shapes(
@@ -60,23 +53,78 @@ def piece_shapes(
     for piece, loops in enumerate(borders.loops):
         rings = tuple(surface.points[tails(surface, loop)] for loop in loops)
         inside = polygon_of(rings)
-        own_tabs = [tab.polygon for tab in tabs if tab.piece == piece]
-        has_allowance = any(width[loop].any() for loop in loops)
-        cut = widened(rings, [width[loop] for loop in loops], finish.is_round) if has_allowance else inside
-        if own_tabs:
-            cut = united([cut, *(polygon_of([points]) for points in own_tabs)])
-        # Slits inside allowances are seam lines; without allowances and tabs, the rings are cut, slits among them.
-        slits = slits_of(rings) if own_tabs and not has_allowance else ()
-        shapes.append(PieceShape(rings, inside, cut, has_allowance or bool(own_tabs), slits))
+        own_tabs = [tab for tab in tabs if tab.piece == piece]
+        if any(width[loop].any() for loop in loops):
+            cut = widened(rings, [width[loop] for loop in loops], finish.is_round)
+            cut = united([cut, *(polygon_of([tab.polygon]) for tab in own_tabs)]) if own_tabs else cut
+            cut_rings = tuple(np.asarray(ring.coords)[:-1] for ring in (cut.exterior, *cut.interiors))
+            shapes.append(PieceShape(rings, inside, cut, True, cut_rings))
+        elif own_tabs:
+            cut = united([inside, *(polygon_of([tab.polygon]) for tab in own_tabs)])
+            tab_of = {
+                int(borders.seams[tab.seam].sides[tab.side].halfedges[tab.edges[0]]): tab for tab in own_tabs
+            }
+            cut_rings = tuple(_with_tabs(surface, borders, loop, tab_of) for loop in loops)
+            shapes.append(PieceShape(rings, inside, cut, True, cut_rings))
+        else:
+            shapes.append(PieceShape(rings, inside, inside, False, rings))
     return shapes
 
 
-def slits_of(rings: Sequence[FloatArray]) -> tuple[FloatArray, ...]:
-    """Return the edges (2, 2) of rings of points (k, 2) that lie on each other in opposite directions, once each."""
-    edges = np.concatenate([np.stack([ring, np.roll(ring, -1, axis=0)], axis=1) for ring in rings])
-    ends = edges.reshape(-1, 4)
-    pairs = cKDTree(ends).query_ball_point(ends[:, [2, 3, 0, 1]], GRID)
-    return tuple(edges[i] for i, partners in enumerate(pairs) if any(i < partner for partner in partners))
+def _with_tabs(
+    surface: CutSurface, borders: Borders, loop: IntArray, tab_of: Mapping[int, Tab]
+) -> FloatArray:
+    """Return the points (k, 2) of a border with the outlines of tabs, without rounding.
+
+    Args:
+        surface: the pieces.
+        borders: their borders.
+        loop: the half-edges of the border.
+        tab_of: tabs by the first half-edge of their base.
+    """
+    starts = [place for place, halfedge in enumerate(loop.tolist()) if halfedge in tab_of]
+    if not starts:
+        return surface.points[tails(surface, loop)]
+    loop = np.roll(loop, -starts[0])
+    border, parts, place = surface.points[tails(surface, loop)], list[FloatArray](), 0
+    while place < len(loop):
+        tab = tab_of.get(int(loop[place]))
+        if tab is None:
+            parts.append(border[place : place + 1])
+            place += 1
+        else:
+            before, base, after = _divided(_side_of_tab(surface, borders, tab), tab.polygon)
+            parts.append(np.concatenate([before, base[:1], tab.polygon[1:-1], base[-1:], after])[:-1])
+            place += tab.edges[1] - tab.edges[0]
+    return np.concatenate(parts)
+
+
+def fold_of_tab(surface: CutSurface, borders: Borders, tab: Tab) -> FloatArray:
+    """Return the points (k, 2) of the border of a piece along the base of a tab."""
+    return _divided(_side_of_tab(surface, borders, tab), tab.polygon)[1]
+
+
+def _side_of_tab(surface: CutSurface, borders: Borders, tab: Tab) -> FloatArray:
+    """Return the points (k, 2) of the straight part of a border on which a tab is."""
+    first, last = tab.edges
+    return surface.points[borders.seams[tab.seam].sides[tab.side].points[first : last + 1]]
+
+
+def _divided(side: FloatArray, polygon: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return the points (k, 2) of a straight side before the base of a tab, along it, and after it.
+
+    Where the base begins or ends at a point of the side, this point is the exact one.
+    """
+    along = side[-1] - side[0]
+    along = along / np.linalg.norm(along)
+    stations, (start, end) = (side - side[0]) @ along, (polygon[[0, -1]] - side[0]) @ along
+    corners = [
+        point[None] if np.abs(stations - station).min() > GRID else np.empty((0, 2))
+        for station, point in ((start, polygon[0]), (end, polygon[-1]))
+    ]
+    is_inside = (stations >= start - GRID) & (stations <= end + GRID)
+    before, after = side[~is_inside & (stations < end)], side[~is_inside & (stations > start)]
+    return before, np.concatenate([corners[0], side[is_inside], corners[1]]), after
 
 
 def tails(surface: CutSurface, halfedges: IntArray) -> IntArray:

@@ -60,7 +60,8 @@ def _notes_on_strain(surface: CutSurface) -> Iterator[str]:
     if len(pieces):
         yield (
             f"no bend lines in {len(pieces)} of {plural(len(strains), 'piece')} ({list_some((pieces + 1).tolist())}), "
-            f"curved in two directions: lengths change by up to {100 * strains.max():.2g} %"
+            f"curved in two directions: lengths change by up to {100 * strains.max():.2g} %; kinds gores and cloth "
+            "change them less"
         )
 
 

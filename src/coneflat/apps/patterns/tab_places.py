@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -37,7 +38,7 @@ class PlacedTabs:
                 return True
         return False
 
-    def exchange(self, number: int, choices: list[list[FloatArray]]) -> bool:
+    def exchange(self, number: int, choices: Mapping[int, list[FloatArray]]) -> bool:
         """Place a tab where a single other one is in the way, which fits elsewhere; return whether that is possible."""
         for side in (0, 1):
             for polygon in choices[number][side]:

@@ -20,18 +20,22 @@ from .development import MIN_FOLD_ANGLE
 from .polylines import ends_of_straight_parts
 from .tab_places import PlacedTabs, areas_of, largest_area, shrunk
 
-# Angle at the ends of a tab, radians; it is smaller where there is less room.
-END_ANGLE = np.pi / 4
-# Fractions that are tried: of the free angle at the ends, of the width, and where a tab begins and ends on the edge.
+# Angle at the ends of a tab, radians, and the one of the tabs of sides without room for such a tab, mostly short ones;
+# it is smaller beside narrow gaps.
+END_ANGLE, STEEP_ANGLE = np.pi / 4, np.radians(75)
+# Fractions that are tried: of the free angle at the ends, of the width, and of the room along the edge at that height.
 ANGLE_SHARES = (1.0, 0.5)
 HEIGHTS = (1.0, 0.75, 0.5, 0.35, 0.25)
-SPANS = ((0.0, 1.0), (0.0, 0.6), (0.4, 1.0), (0.2, 0.8))
+SPANS = ((0.0, 1.0), (0.0, 0.6), (0.4, 1.0), (0.2, 0.8), (0.0, 0.3), (0.35, 0.65), (0.7, 1.0))
 # Fraction of the length of its base that the insets of a tab may take.
-MAX_INSETS = 0.9
+MAX_INSETS = 0.95
+# Fraction of the depth of the face that it is glued to which a tab may take.
+MAX_DEPTH = 0.9
 # Angle up to which a free angle at an end is not used, radians.
 MIN_ANGLE = 0.02
 # Distance of the two sides of a seam, relative to its length, below which it is closed in the plane.
 CLOSED = 1e-5
+NO_TABS = np.empty((0, 4, 2))
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,8 +77,9 @@ class Tabs:
         if not count:
             return ()
         return (
-            f"{count} of {plural(count + len(self.tabs), 'glue tab')} have no room, the longest of them on an edge of "
-            f"{self.lengths_without.max():.1f} mm: make the model larger, or the tabs narrower",
+            f"{count} of {plural(count + len(self.tabs), 'glue tab')} {'has' if count == 1 else 'have'} no room, the "
+            f"longest edge without one is {self.lengths_without.max():.1f} mm: glue these with a strip behind, or make "
+            "the model larger or the tabs narrower",
         )
 
 
@@ -82,7 +87,8 @@ def glue_tabs(surface: CutSurface, borders: Borders, width: float) -> Tabs:
     """Return glue tabs, one on one side of each straight part of a seam.
 
     Tabs are trapezoids of a given width with angles of 45 degrees. Where there is less room, they are lower, down to a
-    quarter of the width, shorter, or have smaller angles. They fit below the face that they are glued to.
+    quarter of the width, shorter, or have smaller angles, or steeper ends if that does not suffice. They fit below the
+    face that they are glued to.
 
     Args:
         surface: a net, with pieces anywhere.
@@ -171,14 +177,24 @@ class _Room:
         return sums[inverse.reshape(-1)].reshape(-1, 3)
 
     def tabs(self) -> Tabs:
-        """Return the tabs: parts with the least room first, each on the side with more room that is left."""
-        trapezoids = [[self._trapezoids(part, side) for side in (0, 1)] for part in self.parts]
-        choices = self._free_of_pieces(trapezoids)
-        areas = [max(largest_area(sides[0][:1]), largest_area(sides[1][:1])) for sides in choices]
-        placed = PlacedTabs(self.shapely)
-        for number in np.argsort(np.round(areas, 9), kind="stable").tolist():
-            if not placed.put(number, choices[number]):
-                placed.exchange(number, choices)
+        """Return the tabs: parts with the least room first, each on the side with more room that is left.
+
+        Parts without room for a tab with gentle ends get one with steep ends, if there is room for that.
+        """
+        placed, choices = (
+            PlacedTabs(self.shapely),
+            {number: [NO_TABS, NO_TABS] for number in range(len(self.parts))},
+        )
+        for angle in (END_ANGLE, STEEP_ANGLE):
+            remaining = [number for number in choices if number not in placed.items]
+            trapezoids = [
+                [self._trapezoids(self.parts[number], side, angle) for side in (0, 1)] for number in remaining
+            ]
+            choices.update(zip(remaining, self._free_of_pieces(trapezoids), strict=True))
+            areas = [max(largest_area(sides) for sides in choices[number]) for number in remaining]
+            for place in np.argsort(np.round(areas, 9), kind="stable").tolist():
+                if not placed.put(remaining[place], choices[remaining[place]]):
+                    placed.exchange(remaining[place], choices)
         tabs = [self._tab(number, side, polygon) for number, (side, polygon) in sorted(placed.items.items())]
         without = [self._length(part) for number, part in enumerate(self.parts) if number not in placed.items]
         return Tabs(tuple(tabs), np.array(without))
@@ -193,8 +209,14 @@ class _Room:
         shift = self.shifts[part.sides[side].halfedges[0] // 3]
         return Tab(polygon - shift, part.seam, side, piece, part.range_of(side))
 
-    def _trapezoids(self, part: _Part, side: int) -> FloatArray:
-        """Return (k, 4, 2) trapezoids on a side of a part, whether there is room or not; the largest first."""
+    def _trapezoids(self, part: _Part, side: int, angle: float) -> FloatArray:
+        """Return (k, 4, 2) trapezoids on a side of a part, whether there is room or not; the largest first.
+
+        Args:
+            part: the part.
+            side: 0 or 1.
+            angle: the largest angle at their ends, radians.
+        """
         halfedges, partners = part.halfedges(side), part.halfedges(1 - side)
         first, last = halfedges[0], halfedges[-1]
         triangle, corner = np.divmod(np.array([first, last]), 3)
@@ -202,31 +224,40 @@ class _Room:
         length = float(np.linalg.norm(end - start))
         along = (end - start) / length
         outward = np.array([along[1], -along[0]])
-        free = self._end_angles(first, last, partners)
-        depth = self._depth(partners)
-        trapezoids = []
-        for share in ANGLE_SHARES:
-            angles = np.minimum(END_ANGLE, [share * free[0], share * free[1]])
-            for begin, stop in SPANS:
-                ends = [angles[0] if begin == 0 else END_ANGLE, angles[1] if stop == 1 else END_ANGLE]
-                if min(ends) < MIN_ANGLE:
-                    continue
-                insets = 1 / np.tan(ends)
-                base = (stop - begin) * length
-                highest = min(self.width, MAX_INSETS * base / insets.sum(), MAX_INSETS * depth)
-                for height in HEIGHTS:
-                    tall = min(height * self.width, highest)
-                    if tall < HEIGHTS[-1] * self.width:
-                        continue
-                    stations = [
-                        (begin * length, 0.0),
-                        (begin * length + tall * insets[0], tall),
-                        (stop * length - tall * insets[1], tall),
-                        (stop * length, 0.0),
-                    ]
-                    trapezoids.append([start + x * along + y * outward for x, y in stations])
-        polygons = np.unique(np.array(trapezoids).reshape(-1, 4, 2), axis=0)
+        free = np.array(self._end_angles(first, last, partners))
+        depth = MAX_DEPTH * self._depth(partners)
+        corners = [
+            outline
+            for share in ANGLE_SHARES
+            for outline in self._outlines(length, angle, share * free, depth)
+        ]
+        stations = np.unique(np.array(corners).reshape(-1, 4, 2), axis=0)
+        polygons = start + stations[..., :1] * along + stations[..., 1:] * outward
         return polygons[np.argsort(-np.round(areas_of(polygons), 9), kind="stable")]
+
+    def _outlines(
+        self, length: float, angle: float, free: FloatArray, depth: float
+    ) -> Iterator[list[tuple[float, float]]]:
+        """Yield the corners of trapezoids, each along the part and outward from its start.
+
+        Args:
+            length: of the part.
+            angle: the largest angle at their ends, radians.
+            free: (2,) the free angles at the ends of the part, within which also shorter ones stay.
+            depth: largest height.
+        """
+        if free.min() < MIN_ANGLE:
+            return
+        insets = 1 / np.tan(np.minimum(angle, free))
+        highest = min(self.width, depth, MAX_INSETS * length / insets.sum())
+        talls = {min(height * self.width, highest) for height in HEIGHTS}
+        for tall in sorted(tall for tall in talls if tall >= HEIGHTS[-1] * self.width):
+            left, right = tall * insets[0], length - tall * insets[1]
+            foot = tall / np.tan(angle)
+            for begin, stop in SPANS:
+                top = left + begin * (right - left), left + stop * (right - left)
+                base = (0.0 if begin == 0 else top[0] - foot), (length if stop == 1 else top[1] + foot)
+                yield [(base[0], 0.0), (top[0], tall), (top[1], tall), (base[1], 0.0)]
 
     def _end_angles(self, first: int, last: int, partners: IntArray) -> tuple[float, float]:
         """Return the largest angles of a tab at both ends: outside its piece, and of the face that it is glued to."""

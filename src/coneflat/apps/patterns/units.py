@@ -8,6 +8,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
+import numpy as np
+
 from ...base import short_repr
 from ...errors import OptionError
 from ...options import Kind
@@ -25,18 +27,21 @@ class Length(Kind):
     Attributes:
         optional: None is allowed, also as the word "none".
         is_positive: the length must be above 0, not only 0 or more.
+        maximum: the largest length, mm.
     """
 
     metavar: ClassVar[str] = "LENGTH"
     optional: bool = False
     is_positive: bool = False
+    maximum: float = math.inf
 
     def parse(self, name: str, value: Any) -> float | None:
         if self.optional and (value is None or (isinstance(value, str) and value == "none")):
             return None
         length = length_of(value)
-        if length is None or length < 0 or (self.is_positive and length == 0):
+        if length is None or not 0 <= length <= self.maximum or (self.is_positive and length == 0):
             bound = "above 0" if self.is_positive else "0 or more"
+            bound += f" and at most {self.maximum:g} mm" if math.isfinite(self.maximum) else ""
             raise OptionError(
                 f"{name} must be a length, {bound}, such as 7mm, 0.7cm or 0.25in, got {short_repr(value)}"
             )
@@ -99,6 +104,11 @@ def text_of_size(extents: Any) -> str:
     return (
         " x ".join(f"{length:,.0f}" if length >= 100 else f"{length:.3g}" for length in lengths) + f" {unit}"
     )
+
+
+def text_of_direction(direction: Any) -> str:
+    """Return a direction of three numbers as a text that the option axis takes, such as "0,0,1"."""
+    return ",".join(f"{number:.3g}" for number in np.asarray(direction, dtype=float).round(6) + 0.0)
 
 
 def area_text(area: float) -> str:

@@ -1,0 +1,63 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from shapes import cylinder, grid, sphere, torus
+
+import coneflat
+from coneflat.errors import MeshError, OptionError
+
+FLAT = grid(4, 3)
+
+
+@pytest.mark.parametrize("turns", [0, 1, 2])
+def test_the_height_of_a_flat_model_is_along_an_axis_in_which_it_extends(turns):
+    vertices, faces = FLAT
+    result = coneflat.pattern(np.roll(vertices, turns, axis=1), faces, height=100.0)
+    extents = np.ptp(result.surface.mesh.vertices, axis=0)
+    assert np.isclose(extents, 100).any()
+    assert sorted(extents / extents.max()) == pytest.approx(
+        sorted(np.ptp(vertices, axis=0) / np.ptp(vertices, axis=0).max())
+    )
+
+
+def test_no_height_along_an_axis_that_is_given_is_an_error_that_names_it():
+    with pytest.raises(OptionError, match="along the axis 0,0,1 is 0: give another axis"):
+        coneflat.pattern(*FLAT, height=100.0, axis=(0, 0, 1))
+
+
+@pytest.mark.parametrize(
+    ("mesh", "axis"), [(torus(), (0, 0, 1)), (cylinder(), (0, 1, 0)), (torus(), (0, 3, 4))]
+)
+def test_gores_that_are_no_strips_name_the_axis(mesh, axis):
+    text = ",".join(f"{number:.3g}" for number in np.array(axis) / np.linalg.norm(axis))
+    with pytest.raises(MeshError, match=f"around the axis, here {text}, .* give another axis"):
+        coneflat.pattern(*mesh, kind="gores", height=100.0, axis=axis)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"seam_allowances": "A=5mm,A=7mm"}, "gives the seam A two widths, 5 and 7 mm"),
+        ({"seam_allowances": "A=5m"}, "up to 500 mm"),
+        ({"allowance": "5000mm"}, "at most 500 mm"),
+        ({"kind": "gores", "gores": 900}, "from 2 to 200"),
+    ],
+)
+def test_options_beyond_reason_are_errors(options, message):
+    with pytest.raises(OptionError, match=message):
+        coneflat.pattern(*FLAT, height=100.0, **options)
+
+
+def test_the_same_width_twice_is_that_width():
+    result = coneflat.pattern(
+        *cylinder(12, 2), kind="gores", gores=3, axis=(0, 0, 1), height=100.0, seam_allowances="A=5mm,A=0.5cm"
+    )
+    assert result.settings["seam_allowances"] == "A=5mm,A=0.5cm"
+
+
+def test_strain_of_gores_that_materials_do_not_have_is_noted():
+    result = coneflat.pattern(*sphere(2), kind="gores", gores=4, axis=(0, 1, 1), height=100.0)
+    strain = 100 * np.abs(result.strains).max()
+    assert strain > 5
+    assert any(f"change by up to {strain:.2g} %" in note for note in result.notes)
