@@ -93,6 +93,52 @@ def test_a_round_bend_is_one_line_with_its_angle_and_radius(radius, degrees, fac
     )
 
 
+def arc(radius: float, turns):
+    """Points on a circle at given angles."""
+    return radius * np.stack([np.cos(turns), np.sin(turns)], axis=1)
+
+
+EVEN, UNEVEN = np.linspace(0, 1.2, 20), 1.2 * np.linspace(0, 1, 20) ** 1.5
+
+
+@pytest.mark.parametrize("turns", [EVEN, UNEVEN, np.linspace(0, 1.2, 61)], ids=["even", "uneven", "fine"])
+def test_a_rolled_plate_is_one_bend_from_border_to_border(turns):
+    plate = extruded(arc(50, turns))
+    surface, (bend,) = exact(plate)
+    assert np.degrees(abs(bend.angle)) == pytest.approx(np.degrees(1.2))
+    assert bend.radius == pytest.approx(50)
+    assert bend.width == pytest.approx(np.ptp(surface.points @ _across(bend)))
+    np.testing.assert_allclose(
+        bend.line.mean(axis=0) @ _across(bend),
+        np.mean([(surface.points @ _across(bend)).min(), (surface.points @ _across(bend)).max()]),
+        atol=1e-9,
+    )
+    vertices, faces, _ = renumber(plate.vertices, plate.faces)
+    _, (moved,) = exact(check_mesh(1e-3 * vertices @ rotation().T + 7, faces).mesh)
+    np.testing.assert_allclose(
+        [abs(moved.angle), 1e3 * moved.radius], [abs(bend.angle), bend.radius], rtol=1e-6
+    )
+
+
+@pytest.mark.parametrize("facets", [3, 4, 12])
+@pytest.mark.parametrize("web", [1.0, 5.0, 30.0])
+def test_round_bends_on_both_sides_of_a_web_are_two(facets, web):
+    first = np.add([4, 0], arc(4, np.linspace(np.pi, 1.5 * np.pi, facets + 1)))
+    second = np.add([4 + web, 0], arc(4, np.linspace(1.5 * np.pi, 2 * np.pi, facets + 1)))
+    _, bends = exact(extruded(np.concatenate([[[0, 20]], first, second, [[8 + web, 20]]])))
+    np.testing.assert_allclose(np.degrees([abs(bend.angle) for bend in bends]), [90, 90])
+    np.testing.assert_allclose([bend.radius for bend in bends], [4, 4])
+
+
+def test_a_hole_divides_a_round_bend_in_two():
+    bracket = extruded(round_profile(5, np.pi / 2), 60, 12)
+    middle = bracket.vertices[bracket.faces].mean(axis=1)
+    is_hole = (np.abs(middle[:, 1] - 30) < 6) & (middle[:, 0] > 30) & (middle[:, 2] < 5)
+    _, bends = exact(check_mesh(*without(bracket.vertices, bracket.faces, is_hole)).mesh)
+    np.testing.assert_allclose(np.degrees([abs(bend.angle) for bend in bends]), [90, 90])
+    np.testing.assert_allclose([bend.radius for bend in bends], [5, 5])
+
+
 def test_two_flanges_beside_a_web_are_two_bends():
     _, bends = exact(extruded([[0, 20], [0, 0], [20, 0], [20, 20]]))
     assert len(bends) == 2
@@ -103,7 +149,9 @@ def test_a_tube_is_one_bend_and_a_cone_has_none():
     surface, (bend,) = exact(mesh)
     assert surface.seam_length == pytest.approx(3)
     assert bend.radius == pytest.approx(1)
-    assert np.degrees(abs(bend.angle)) == pytest.approx(345)
+    # The first and the last facet are half inside the bend about their folds, and half beyond.
+    assert np.degrees(abs(bend.angle)) == pytest.approx(360)
+    assert bend.width == pytest.approx(24 * 2 * np.sin(np.pi / 24))
     assert exact(turned(np.linspace(1, 0.4, 7), np.linspace(0, 1, 7)))[1] == ()
 
 
