@@ -91,6 +91,12 @@ def test_half_planes_near_vertices_leave_no_needles(mesh):
     assert max(strains) < limit
 
 
+@pytest.mark.parametrize(("around", "tilt"), [(32, 0.02), (64, 0.01)])
+def test_vertices_beside_the_axis_do_not_slide_across_half_planes(around, tilt):
+    surface = cut_gores(uv_sphere(around, around // 2), 8, np.array([0.0, tilt, 1.0])).surface
+    assert surface.pieces.max() + 1 == 8
+
+
 def test_gores_along_a_tilted_axis_are_nearly_congruent():
     mesh = uv_sphere(24, 16)
     tilt = 1e-3

@@ -90,7 +90,7 @@ class _Strips:
         frame = _frame(mesh, centre, unit_vectors(axis[None])[0])
         around = AroundAxis.of(mesh, centre, frame)
         for number in range(count):
-            around = around.split_at(2 * np.pi * number / count)
+            around = around.split_at(2 * np.pi * number / count, 2 * np.pi / count)
         vertices = centre + around.vertices @ frame
         turns = _turns(around.vertices[around.faces].mean(axis=1))
         return cls(

@@ -101,14 +101,17 @@ class AroundAxis:
             longest=np.concatenate([self.longest, longest]),
         )
 
-    def split_at(self, angle: float) -> AroundAxis:
+    def split_at(self, angle: float, spacing: float) -> AroundAxis:
         """Return the surface with all triangles divided that the half-plane at an angle from the first axis crosses.
 
-        Vertices near it slide onto it.
+        Vertices near it slide onto it, unless the next half-plane, at an angle of `spacing`, is nearer: beside the axis,
+        edges reach across several.
         """
         mesh = TriangleMesh(self.vertices, self.faces)
         crossings = self._crossings(mesh, angle)
-        vertices = slid_to_crossings(mesh, *crossings, self.is_fixed, self.longest)
+        turns = np.arctan2(self.vertices[:, 1], self.vertices[:, 0]) - angle
+        is_remote = np.abs(np.remainder(turns + np.pi, 2 * np.pi) - np.pi) > spacing / 2
+        vertices = slid_to_crossings(mesh, *crossings, self.is_fixed | is_remote, self.longest)
         is_moved = (vertices != self.vertices).any(axis=1)
         surface = replace(self, vertices=vertices, is_fixed=self.is_fixed | is_moved)
         return surface._split(*surface._crossings(TriangleMesh(vertices, self.faces), angle), False)
