@@ -8,9 +8,9 @@ from ... import TriangleMesh
 from ...base import BoolArray, FloatArray, IntArray
 from ...mesh import tie_key
 
-# How far vertices slide, relative to an edge: nearer crossings would leave triangles three times longer than wide, whose
+# How far vertices slide, relative to an edge: nearer crossings would leave triangles ten times longer than wide, whose
 # short sides dominate the largest strain.
-MAX_SLIDE = 0.3
+MAX_SLIDE = 0.1
 # How far the surface may move there, relative to the longest edge at the vertex, so that sharp corners remain.
 MAX_HEIGHT = 0.02
 # Area of a triangle after sliding, relative to before, below which its vertices remain.
