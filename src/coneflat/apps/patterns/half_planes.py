@@ -104,8 +104,8 @@ class AroundAxis:
     def split_at(self, angle: float, spacing: float) -> AroundAxis:
         """Return the surface with all triangles divided that the half-plane at an angle from the first axis crosses.
 
-        Vertices near it slide onto it, unless the next half-plane, at an angle of `spacing`, is nearer: edges beside the
-        axis reach across several.
+        Vertices near it slide onto it, unless the next half-plane, at an angle of `spacing`, is nearer: edges
+        beside the axis reach across several.
         """
         mesh = TriangleMesh(self.vertices, self.faces)
         crossings = self._crossings(mesh, angle)
