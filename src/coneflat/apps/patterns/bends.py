@@ -143,8 +143,8 @@ class _Strips:
             for part in self.creases[chain[place]].parts:
                 for number in self.between[part]:
                     turn = sign * self.creases[number].angle
-                    most = (1 + RADII) * 2 * _half_angle(self.widths[part], radius)
-                    if number not in chain and (0 < turn <= most or self._ends_with_facet(number, radius)):
+                    limit = (1 + RADII) * 2 * _half_angle(self.widths[part], radius)
+                    if number not in chain and (0 < turn <= limit or self._ends_with_facet(number, radius)):
                         chain = [number, *chain] if place == 0 else [*chain, number]
         return chain
 
