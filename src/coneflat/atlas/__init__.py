@@ -17,5 +17,6 @@ __all__ = [
     "ChartLayout", "Charts", "Effort", "Frame", "Moves", "Outlines", "Packed", "PageGrid", "Seams", "SheetPacking",
     "arrange_charts", "as_disk", "border_curves", "filled_disk", "injective_charts", "pack_around", "pack_charts",
     "pack_outlines", "pack_page_grid", "pack_sheets", "pack_strip", "rotated_boxes", "round_safely",
-    "separate_overlaps", "separate_touching", "similarities", "square_angle", "straight_angle", "turns_of_quantum", "with_charts",
+    "separate_overlaps", "separate_touching", "similarities", "square_angle", "straight_angle", "turns_of_quantum",
+    "with_charts",
 ]  # fmt: skip

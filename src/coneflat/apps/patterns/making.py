@@ -6,11 +6,13 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from ...base import component_at_work, plural, timing, warns
 from ...options import read_options, settings, takes
 from .cloth import cloth_pieces
+from .cut_surface import piece_areas
 from .development import Development
 from .finish import Finish
 from .gaps import notes_on_gaps
@@ -18,6 +20,7 @@ from .gores import cut_gores
 from .model import Model, read_model
 from .nesting import nested
 from .net import unfold_net
+from .numbering import order_around
 from .options import PatternOptions
 from .result import Pattern
 from .sheet import develop_sheet
@@ -72,7 +75,11 @@ def _net(model: Model, options: PatternOptions) -> Development:
 
 
 def _gores(model: Model, options: PatternOptions) -> Development:
-    return cut_gores(model.mesh, options.gores, model.axis)
+    developed = cut_gores(model.mesh, options.gores, model.axis)
+    surface = developed.surface
+    centres = piece_areas(surface.mesh, surface.pieces)[1]
+    rank = np.argsort(order_around(centres, model.axis))
+    return replace(developed, surface=replace(surface, sequence=rank[surface.pieces]))
 
 
 def _sheet(model: Model, options: PatternOptions) -> Development:
