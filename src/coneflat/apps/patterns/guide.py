@@ -127,9 +127,10 @@ def _how_to_read(pattern: Pattern) -> Iterator[str]:
         yield "Sides with the same name meet. Solid black lines are cut."
     if pattern.is_sewn:
         yield (
-            "Grey dashed lines are sewn. Notches match on both sides of a seam; the double one is the same on both. "
-            "The arrow is the grain."
+            "Grey dashed lines are sewn. Notches match on both sides of a seam; the double one is the same on both."
         )
+    if pattern.has_grain:
+        yield "The arrow is the grain."
     if pattern.darts:
         yield "A dart is sewn together along its two sides, from the border to its tip, which is marked by a circle."
     if len(pattern.folds) or pattern.bends or pattern.tabs:

@@ -73,7 +73,7 @@ def grain_up(surface: CutSurface, axis: FloatArray) -> CutSurface:
 def nested(pattern: Pattern) -> Pattern:
     """Return a pattern with its pieces side by side, at least GAP apart, allowances and tabs included.
 
-    The grain of cloth and gores remains upward or downward; other pieces take any angle. Where each piece fits on a
+    A grain remains upward or downward; other pieces take any angle. Where each piece fits on a
     page, pieces are distributed over the fewest pages, and none crosses the border of one. Otherwise, pages are
     put together to a sheet on which the fewest are needed, and then the fewest pieces cross their borders.
 
@@ -84,7 +84,7 @@ def nested(pattern: Pattern) -> Pattern:
     shapes = piece_shapes(
         pattern.surface, pattern.borders, Finish.of(pattern.kind, pattern.settings), pattern.tabs
     )
-    pieces = _Pieces(_outlines(shapes), _angles(shapes, pattern.is_sewn))
+    pieces = _Pieces(_outlines(shapes), _angles(shapes, pattern.has_grain))
     return _moved(pattern, _packed(pieces, shapes, paper))
 
 

@@ -48,7 +48,7 @@ def drawing_of(pattern: Pattern) -> Drawing:
         rooms.inside[piece_of_point[ends[0]]].avoid(shapely().LineString(points[ends]))
     for piece, room in enumerate(rooms.inside):
         lines += add_number(room, rooms.outside, piece, shapes[piece].inside.area)
-        if pattern.is_sewn:
+        if pattern.has_grain:
             lines += add_grain(room)
     for seam in sorted(pattern.seams, key=lambda seam: -min(seam.lengths)):
         for name in names_of(pattern.kind, seam, points, is_single=pattern.piece_count == 1):
