@@ -27,9 +27,12 @@ EXACT = 1e-6
 def page_of_pattern(pattern: Pattern, *, name: str = "Pattern", show: str = "charts", **look: Any) -> str:
     """Return the HTML page of a pattern; arguments and errors are those of `page_html`."""
     strain = float(np.abs(pattern.strains).max())
-    parts = [plural(pattern.piece_count, "piece"), plural(len(pattern.seams) - len(pattern.darts), "seam")]
-    if pattern.is_sewn:
-        parts.append(plural(len(pattern.darts), "dart"))
+    cuts, noun = (pattern.darts, "dart") if pattern.is_sewn else (pattern.corner_cuts, "corner cut")
+    parts = [
+        plural(pattern.piece_count, "piece"),
+        plural(len(pattern.seams) - len(cuts), "seam"),
+        plural(len(cuts), noun),
+    ]
     if strain > EXACT:
         parts.append(f"strain {100 * strain:.2g} %")
     text = PageText(title="  ·  ".join(parts), rows=rows_of(pattern))
@@ -87,22 +90,22 @@ def parts_of(pattern: Pattern) -> PageParts:
     seam_of_edge = np.empty(len(surface.mesh.edges), dtype=np.int64)
     for number, seam in enumerate(pattern.seams):
         seam_of_edge[surface.mesh.halfedge_edges[seam.sides[0].halfedges]] = number
-    darts = {seam.name for seam in pattern.darts}
     return PageParts(
         pieces=surface.pieces,
         anchors=_anchors(pattern),
         seams=seam_of_edge[surface.seams],
         seam_names=[seam.name for seam in pattern.seams],
-        seam_texts=[_seam_text(seam, seam.name in darts) for seam in pattern.seams],
+        seam_texts=[_seam_text(seam, pattern.is_sewn) for seam in pattern.seams],
         strain=_strains(pattern),
         strain_title="Strain: largest change of a side, at true scale",
     )
 
 
-def _seam_text(seam: Seam, is_dart: bool) -> str:
+def _seam_text(seam: Seam, is_sewn: bool) -> str:
     length, shorter = max(seam.lengths), min(seam.lengths)
     eased = f" eased to {shorter:.1f} mm" if seam.is_eased else ""
-    return f"{'Dart' if is_dart else 'Seam'} {seam.name}, {length:.1f} mm{eased}"
+    noun = "Seam" if not seam.is_dart else "Dart" if is_sewn else "Corner cut"
+    return f"{noun} {seam.name}, {length:.1f} mm{eased}"
 
 
 def _tips(pattern: Pattern) -> IntArray:

@@ -87,6 +87,11 @@ class Pattern:
         """The seams that end in a tip inside a piece; none in nets and sheets, which are not sewn."""
         return tuple(seam for seam in self.seams if seam.is_dart and self.is_sewn)
 
+    @property
+    def corner_cuts(self) -> tuple[Seam, ...]:
+        """The cuts of nets and sheets that end inside a piece, as at the corners of a tray; its sides are joined."""
+        return tuple(seam for seam in self.seams if seam.is_dart and not self.is_sewn)
+
     @cached_property
     def bends(self) -> tuple[Bend, ...]:
         """The bends of a sheet; none of other kinds, and of pieces that are stretched."""
