@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from ...base import FloatArray, plural
 from .drawing import Drawing, Text
 from .finish import Finish
-from .labels import CHARACTER_WIDTH
 from .pages import Page, Picture, cut_shapes, page_map, ruler
 from .papers import IN_INCHES, MARGIN, Paper
 from .report import piece_sizes
@@ -27,8 +27,11 @@ PIXELS = 200 / 25.4
 TITLE, BODY, NUMBER, LEADING = 5.0, 2.3, 3.4, 4.4
 # Width of the numbers of a list, mm.
 INDENT = 6.0
-# Height of the pictures relative to that of the page.
-PICTURES = 0.4
+# Height of the pictures relative to that of the page, and the smallest one.
+PICTURES, MIN_PICTURES = 0.4, 0.15
+# Width of a column of text beside the map of the pages, relative to that of the page; mean width of a character of
+# longer texts relative to the height of capitals.
+TEXT_SHARE, CHARACTER = 0.68, 0.76
 # Space between parts of a page, mm.
 SPACE = 5.0
 
@@ -60,27 +63,33 @@ def _overview(
 ) -> Iterator[Page]:
     """Yield the first page, and a page of notes if there is no room for them."""
     width, height = own_paper.inner_width, own_paper.inner_height
+    tiles = tiles_of(cut_shapes(drawing), drawing.width, drawing.height, paper)
+    rulers = ruler(np.array([MARGIN, MARGIN]), own_paper)
+    bottom = MARGIN + (25.0 if own_paper.name in IN_INCHES else 14.0)
     top = MARGIN + height
     texts = [Text(title, np.array([MARGIN, top - TITLE / 2]), TITLE, is_left=True)]
     top -= TITLE + SPACE
     texts += _lines_of_text(_summary(pattern), width, top)
     top = min(float(text.place[1]) for text in texts) - SPACE
-    pictures, numbers = _pictures(pattern, width, PICTURES * height, top)
-    texts += numbers
-    top -= PICTURES * height + SPACE
-    tiles = tiles_of(cut_shapes(drawing), drawing.width, drawing.height, paper)
-    steps = [*_list_of_text(steps_of(pattern, tiles, paper), width, top)]
-    texts += steps
-    top = float(steps[-1].place[1]) - SPACE
-    rulers = ruler(np.array([MARGIN, MARGIN]), own_paper)
-    bottom = MARGIN + (25.0 if own_paper.name in IN_INCHES else 14.0)
-    notes = [*_list_of_text(pattern.notes, width, top, numbered=False)]
+    # The map is beside the text. Pictures are smaller where steps need their room.
+    column = TEXT_SHARE * width if len(tiles) > 1 and paper.height is not None else width
+    steps = [*_list_of_text(steps_of(pattern, tiles, paper), column, 0.0)]
+    room = top - bottom + float(steps[-1].place[1]) - 3 * SPACE
+    picture_height = max(min(PICTURES * height, room), MIN_PICTURES * height)
+    pictures, numbers = _pictures(pattern, width, picture_height, top)
+    top -= picture_height + SPACE
+    texts += [*numbers, *(replace(text, place=text.place + np.array([0.0, top])) for text in steps)]
+    text_top = top + float(steps[-1].place[1]) - SPACE
+    notes = [*_list_of_text(pattern.notes, column, text_top, numbered=False)]
     have_room = not notes or float(notes[-1].place[1]) > bottom
-    if notes and have_room:
-        texts, top = [*texts, *notes], float(notes[-1].place[1]) - SPACE
+    texts += notes if have_room else []
     lines, texts = [*rulers.lines], [*texts, *rulers.texts]
-    if paper.height is not None and top - bottom > 2 * SPACE:
-        small = page_map(drawing, paper, np.array([MARGIN, bottom]), np.array([width, top - bottom]))
+    if column < width:
+        map_low, map_size = (
+            np.array([MARGIN + column + SPACE, bottom]),
+            (width - column - SPACE, top - bottom),
+        )
+        small = page_map(drawing, paper, map_low, np.array(map_size))
         lines, texts = [*lines, *small.lines], [*texts, *small.texts]
     size = width + 2 * MARGIN, height + 2 * MARGIN
     yield Page(Drawing(*size, tuple(lines), tuple(texts)), pictures=tuple(pictures))
@@ -136,7 +145,7 @@ def _summary(pattern: Pattern) -> list[str]:
 
 def _list_of_text(items: Sequence[str], width: float, top: float, numbered: bool = True) -> Iterator[Text]:
     """Yield the lines of a list, from the top downward: with numbers, or with dots."""
-    columns = int((width - INDENT) / (CHARACTER_WIDTH * BODY))
+    columns = int((width - INDENT) / (CHARACTER * BODY))
     y = top - BODY / 2
     for i, item in enumerate(items):
         mark = f"{i + 1}." if numbered else "\u2022"
@@ -149,7 +158,7 @@ def _list_of_text(items: Sequence[str], width: float, top: float, numbered: bool
 
 def _lines_of_text(paragraphs: Sequence[str], width: float, top: float) -> Iterator[Text]:
     """Yield lines of text from the top downward."""
-    columns = int(width / (CHARACTER_WIDTH * BODY))
+    columns = int(width / (CHARACTER * BODY))
     lines = [line for paragraph in paragraphs for line in textwrap.wrap(paragraph, columns)]
     for i, line in enumerate(lines):
         yield Text(line, np.array([MARGIN, top - i * LEADING - BODY / 2]), BODY, is_left=True)
