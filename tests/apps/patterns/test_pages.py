@@ -135,7 +135,8 @@ def test_the_guide_comes_first_and_lists_all_pieces_and_seams(page):
     texts = [text.text for page in pages if page.content is None for text in page.drawing.texts]
     assert {seam.name for seam in pattern.seams} <= set(texts)
     assert any(text.startswith("gores: 9 pieces, 9 seams") for text in texts)
-    assert len(pages[0].pictures) == 2
+    # The model, its pieces moved apart, and the map of the strain with its legend.
+    assert len(pages[0].pictures) == 4
     assert pages[0].pictures[0].pixels.std() > 10
     assert all((page.drawing.width, page.drawing.height) == (paper.width, paper.height) for page in pages)
     for page in pages:

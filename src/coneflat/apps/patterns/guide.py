@@ -16,6 +16,7 @@ from .papers import IN_INCHES, MARGIN, Paper
 from .report import piece_sizes
 from .result import Pattern
 from .steps import steps_of
+from .strain_map import is_strained, percentage, strain_map
 from .tables import Table, laid_out
 from .tiling import tiles_of
 from .units import area_text, text_of_size
@@ -29,9 +30,9 @@ TITLE, BODY, NUMBER, LEADING = 5.0, 2.3, 3.4, 4.4
 INDENT = 6.0
 # Height of the pictures relative to that of the page, and the smallest one.
 PICTURES, MIN_PICTURES = 0.4, 0.15
-# Width of a column of text beside the map of the pages, relative to that of the page; mean width of a character of
-# longer texts relative to the height of capitals.
-TEXT_SHARE, CHARACTER = 0.68, 0.76
+# Widths of a column of text beside the map of the pages, or that of the strain alone, relative to the page; mean width
+# of a character of longer texts relative to the height of capitals.
+TEXT_SHARE, HALF, CHARACTER = 0.66, 0.5, 0.76
 # Space between parts of a page, mm.
 SPACE = 5.0
 
@@ -72,7 +73,8 @@ def _overview(
     texts += _lines_of_text(_summary(pattern), width, top)
     top = min(float(text.place[1]) for text in texts) - SPACE
     # The map is beside the text. Pictures are smaller where steps need their room.
-    column = TEXT_SHARE * width if len(tiles) > 1 and paper.height is not None else width
+    has_map, has_strain = len(tiles) > 1 and paper.height is not None, is_strained(pattern)
+    column = (TEXT_SHARE if has_map else HALF if has_strain else 1.0) * width
     steps = [*_list_of_text(steps_of(pattern, tiles, paper), column, 0.0)]
     room = top - bottom + float(steps[-1].place[1]) - 3 * SPACE
     picture_height = max(min(PICTURES * height, room), MIN_PICTURES * height)
@@ -84,12 +86,15 @@ def _overview(
     have_room = not notes or float(notes[-1].place[1]) > bottom
     texts += notes if have_room else []
     lines, texts = [*rulers.lines], [*texts, *rulers.texts]
-    if column < width:
-        map_low, map_size = (
-            np.array([MARGIN + column + SPACE, bottom]),
-            (width - column - SPACE, top - bottom),
-        )
-        small = page_map(drawing, paper, map_low, np.array(map_size))
+    # Both maps share the column beside the text.
+    place = np.array([MARGIN + column + SPACE, bottom])
+    extent = np.array([width - column - SPACE, (top - bottom) / (has_map + has_strain or 1)])
+    if has_strain:
+        strain_pictures, legend = strain_map(pattern, place, extent - np.array([0.0, has_map * SPACE]))
+        pictures, texts = [*pictures, *strain_pictures], [*texts, *legend.texts]
+        place = place + np.array([0.0, extent[1]])
+    if has_map:
+        small = page_map(drawing, paper, place, extent)
         lines, texts = [*lines, *small.lines], [*texts, *small.texts]
     size = width + 2 * MARGIN, height + 2 * MARGIN
     yield Page(Drawing(*size, tuple(lines), tuple(texts)), pictures=tuple(pictures))
@@ -131,7 +136,7 @@ def _summary(pattern: Pattern) -> list[str]:
     cuts, noun = (pattern.darts, "dart") if pattern.is_sewn else (pattern.corner_cuts, "corner cut")
     darts = f", {plural(len(cuts), noun)}" if cuts else ""
     strain = float(np.abs(pattern.strains).max())
-    stretched = f"; lengths change by at most {100 * strain:.2g} %" if strain > 1e-6 else ""
+    stretched = f"; lengths change by at most {percentage(strain)}" if strain > 1e-6 else ""
     finish = Finish.of(pattern.kind, pattern.settings)
     allowance = (
         f"seam allowance {finish.allowance:g} mm, included" if finish.allowance else "no seam allowance"

@@ -10,7 +10,6 @@ import numpy as np
 
 from ... import Flattening, measure
 from ...base import FloatArray, IntArray, plural
-from ...geometry import edge_lengths
 from ...measures import angle_sum_errors
 from ...stages import SolveStatistics
 from ..view import PageParts, PageText, check_page, open_page, page_html, write_page
@@ -19,6 +18,7 @@ from .borders import Seam
 from .report import rows_of
 from .result import Pattern
 from .shapes import tails
+from .strain_map import percentage, side_strains
 
 # Strain up to which a pattern is as exact as numbers are.
 EXACT = 1e-6
@@ -34,7 +34,7 @@ def page_of_pattern(pattern: Pattern, *, name: str = "Pattern", show: str = "cha
         plural(len(cuts), noun),
     ]
     if strain > EXACT:
-        parts.append(f"strain {100 * strain:.2g} %")
+        parts.append(f"strain {percentage(strain)}")
     text = PageText(title="  ·  ".join(parts), rows=rows_of(pattern))
     return page_html(as_flattening(pattern), name=name, show=show, text=text, parts=parts_of(pattern), **look)
 
@@ -96,7 +96,7 @@ def parts_of(pattern: Pattern) -> PageParts:
         seams=seam_of_edge[surface.seams],
         seam_names=[seam.name for seam in pattern.seams],
         seam_texts=[_seam_text(seam, pattern.is_sewn) for seam in pattern.seams],
-        strain=_strains(pattern),
+        strain=side_strains(pattern.surface),
         strain_title="Strain: largest change of a side, at true scale",
     )
 
@@ -133,12 +133,3 @@ def _depths(places: FloatArray, point: FloatArray) -> FloatArray:
     sides, to_point = np.roll(places, -1, axis=1) - places, point - places
     across = sides[..., 0] * to_point[..., 1] - sides[..., 1] * to_point[..., 0]
     return np.asarray((across / np.linalg.norm(sides, axis=2)).min(axis=1))
-
-
-def _strains(pattern: Pattern) -> FloatArray:
-    """Return (m,) the relative change of length of the side of each triangle that changes most."""
-    surface = pattern.surface
-    flat = edge_lengths(np.pad(surface.points, ((0, 0), (0, 1))), surface.corners)
-    strains = flat / edge_lengths(surface.mesh.vertices, surface.mesh.faces) - 1
-    largest = np.abs(strains).argmax(axis=1)[:, None]
-    return np.take_along_axis(strains, largest, axis=1)[:, 0]

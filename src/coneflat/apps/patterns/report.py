@@ -11,6 +11,7 @@ from .finish import Finish
 from .papers import EDGE, Paper
 from .result import Pattern
 from .shapes import piece_shapes
+from .strain_map import percentage
 from .tiling import tiles_of
 from .units import text_of_size
 
@@ -92,7 +93,7 @@ def rows_of(pattern: Pattern, report: dict[str, Any] | None = None) -> list[tupl
         ),
         (noun, f"{report['darts'] + report['corner_cuts']}", "cuts that end inside a piece"),
         ("seam length", f"{report['seam_length']:.0f} mm", "on the model, darts included"),
-        ("strain", f"{100 * report['strain_max']:.2g} %", "largest relative change of the length of an edge"),
+        ("strain", percentage(report["strain_max"]), "largest relative change of the length of an edge"),
         (
             "sheet",
             f"{report['sheet_width']:.0f} x {report['sheet_height']:.0f} mm",
