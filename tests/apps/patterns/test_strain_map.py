@@ -25,7 +25,7 @@ def test_shrunk_pieces_are_blue_and_the_legend_says_by_how_much():
     assert texts[-1].startswith("largest 10 %, mean ")
     for part in (picture, bar):
         assert (part.low >= LOW).all()
-        assert (part.low + [part.width, part.height] <= LOW + SIZE + 1e-9).all()
+        assert (part.low + np.array([part.width, part.height]) <= LOW + SIZE + 1e-9).all()
 
 
 def test_strains_are_those_of_the_sides():
