@@ -149,7 +149,7 @@ def _values(kind: kinds.Kind) -> str:
         case kinds.Number():
             return f"{kind.text}; alone it is 1" if kind.is_strength else kind.text
         case kinds.Direction():
-            return "`z`, `-y`, `0,0.5,1`"
+            return ", ".join([*_words(kind), "`z`, `-y`, `0,0.5,1`"])
         case kinds.Vertices():
             return "`3,17,8` or a file"
         case kinds.VerticesOrEdges():
@@ -191,7 +191,7 @@ def _python_values(kind: kinds.Kind) -> str:
         case kinds.VerticesOrEdges():
             return "(k,) vertices, or (k, 2) pairs of them"
         case kinds.Direction():
-            return "three numbers"
+            return ", ".join([*(f'`"{word}"`' for word in kind.words), "three numbers"])
         case kinds.Number(is_angle=True):
             return "radians"
         case kinds.Number():

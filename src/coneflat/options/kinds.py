@@ -208,18 +208,27 @@ class Weights(Kind):
 
 @dataclass(frozen=True)
 class Direction(Kind):
-    """A direction in space as three numbers, not all 0; None for no direction."""
+    """A direction in space as three numbers, not all 0, or a word; None for no direction.
 
-    def parse(self, name: str, value: Any) -> tuple[float, float, float] | None:
+    Attributes:
+        words: the words.
+    """
+
+    words: tuple[str, ...] = ()
+
+    def parse(self, name: str, value: Any) -> tuple[float, float, float] | str | None:
         import numpy as np
 
         if value is None:
             return None
+        if isinstance(value, str) and value in self.words:
+            return value
         direction = _array(name, value)
         is_one = direction.shape == (3,) and direction.dtype.kind in "fiu"
         if not (is_one and np.isfinite(direction).all() and direction.any()):
             raise OptionError(
-                f"{name} must be a direction, three numbers that are not all 0, got {short_repr(value)}"
+                f"{name} must be {' or '.join([*self.words, 'a direction'])}, three numbers that are not all 0, "
+                f"got {short_repr(value)}"
             )
         direction = direction.astype(np.float64)
         largest = np.abs(direction).max()

@@ -66,6 +66,19 @@ def test_empty_tiles_are_left_out():
     assert tiles[0].neighbours == ("", "B2", "A3", "")
 
 
+def test_a_tile_whose_content_other_tiles_show_is_left_out():
+    # The square reaches 5 mm into the tile on the right, which the first tile shows, too; at 12 mm it does not.
+    wide = [shapely.box(1, 1, 350, 20)]
+    shown, beyond = square(60, (125.0, 100.0)), square(60, (132.0, 100.0))
+    assert [tile.name for tile in tiles_of([*wide, shown], 351.0, 500.0, Paper.of("A4"))] == ["B1", "B2"]
+    tall = shapely.box(1, 1, 20, 300)
+    names = [
+        [tile.name for tile in tiles_of([tall, part], 351.0, 301.0, Paper.of("A4"))]
+        for part in (shown, beyond)
+    ]
+    assert names == [["A1", "B1"], ["A1", "B1", "B2"]]
+
+
 def test_a_tile_inside_a_large_piece_is_not_left_out():
     assert len(tiles_of([square(900)], 902.0, 902.0, Paper.of("A4"))) == 5 * 4
 
@@ -122,7 +135,8 @@ def test_the_guide_comes_first_and_lists_all_pieces_and_seams(page):
     texts = [text.text for page in pages if page.content is None for text in page.drawing.texts]
     assert {seam.name for seam in pattern.seams} <= set(texts)
     assert any(text.startswith("gores: 9 pieces, 9 seams") for text in texts)
-    assert len(pages[0].pictures) == 2
+    # The model, its pieces moved apart, and the map of the strain with its legend.
+    assert len(pages[0].pictures) == 4
     assert pages[0].pictures[0].pixels.std() > 10
     assert all((page.drawing.width, page.drawing.height) == (paper.width, paper.height) for page in pages)
     for page in pages:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 import click
@@ -27,8 +28,17 @@ def parse_strength(value: Any) -> float:
         raise click.BadParameter(f"{value!r} is not a number; write a strength such as 1") from error
 
 
-def parse_direction(value: Any) -> tuple[float, float, float]:
-    """Return a (3,) direction from z, -y or 0,0.5,1."""
+def direction_parser(words: tuple[str, ...]) -> Callable[[Any], tuple[float, float, float] | str]:
+    """Return a function that returns a (3,) direction from a text, or the text if it is one of some words."""
+
+    def parse_direction(value: Any) -> tuple[float, float, float] | str:
+        return value if value in words else _three_numbers(value, words)
+
+    return parse_direction
+
+
+def _three_numbers(value: Any, words: tuple[str, ...]) -> tuple[float, float, float]:
+    """Return a (3,) direction from z, -y or 0,0.5,1; messages list words, too."""
     text = value.strip().lower()
     axis = "xyz".find(text[-1:])
     if text and axis >= 0 and text[:-1] in ("", "+", "-"):
@@ -37,7 +47,8 @@ def parse_direction(value: Any) -> tuple[float, float, float]:
     try:
         x, y, z = (float(word) for word in text.split(","))
     except ValueError as error:
-        raise click.BadParameter(f"{value!r} is not a direction; write z, -y or 0,0.5,1") from error
+        forms = ", ".join(["z", "-y", *words])
+        raise click.BadParameter(f"{value!r} is not a direction; write {forms} or 0,0.5,1") from error
     return (x, y, z)
 
 

@@ -28,7 +28,7 @@ from ...options import (
     read_word_or_vertex_map,
 )
 from ...quadmesh import Sizes
-from .flag_values import parse_angle_or_inf, parse_direction, parse_strength
+from .flag_values import direction_parser, parse_angle_or_inf, parse_strength
 from .grouped_help import BRIEF, RARE_TITLE, Command, Grouped
 
 G = TypeVar("G")
@@ -126,7 +126,10 @@ def _click_arguments(kind: Kind) -> dict[str, Any]:
         case Number():
             return {"type": int if kind.is_integer else float}
         case declared.Direction():
-            return {"type": parse_direction, "metavar": "DIRECTION"}
+            return {
+                "type": direction_parser(kind.words),
+                "metavar": "|".join((*kind.words, "DIRECTION")),
+            }
         case declared.Vertices() | declared.VerticesOrEdges():
             return {"multiple": True, "metavar": "VERTICES|FILE"}
         case declared.WordOrVertices():

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -11,6 +11,7 @@ import numpy as np
 from ... import TriangleMesh
 from ...base import IntArray
 from .cut_surface import CutSurface
+from .numbering import DIRECTION, order_by_size
 from .polylines import distances
 
 #: Difference of the lengths of the sides of a seam that can be neglected, mm.
@@ -98,18 +99,30 @@ def find_borders(surface: CutSurface) -> Borders:
     of_piece: list[list[IntArray]] = [[] for _ in range(int(surface.pieces.max()) + 1)]
     for walk in walks:
         of_piece[int(surface.pieces[walk[0] // 3])].append(walk)
-    loops = tuple(tuple(sorted(walks, key=lambda walk: -_area(pieces, surface, walk))) for walks in of_piece)
+    loops = tuple(tuple(_ordered(pieces, surface, walks)) for walks in of_piece)
     twins = _twins(surface.mesh)
     following = np.full(3 * len(surface.corners), -1)
     for walk in walks:
         following[walk] = np.roll(walk, -1)
     sides = [
-        side
+        [
+            [*_sides(pieces, surface, _started(surface.mesh, walk, twins, following), twins, following)]
+            for walk in walks_of_piece
+        ]
         for walks_of_piece in loops
-        for walk in walks_of_piece
-        for side in _sides(pieces, surface, _started(walk, twins, following), twins, following)
     ]
     return Borders(loops, tuple(_seams(surface, sides, twins)), tuple(_hems(sides, twins)))
+
+
+def _ordered(pieces: TriangleMesh, surface: CutSurface, walks: Sequence[IntArray]) -> Iterator[IntArray]:
+    """Yield the borders of a piece: the outer one, then holes, the largest first."""
+    areas = np.array([_area(pieces, surface, walk) for walk in walks])
+    vertices = surface.mesh.vertices
+    centres = np.array([vertices[surface.mesh.tails[walk]].mean(axis=0) for walk in walks])
+    # The area inside a hole is negative.
+    holes = np.flatnonzero(areas <= 0)
+    for i in (*np.flatnonzero(areas > 0), *holes[order_by_size(-areas[holes], centres[holes])]):
+        yield walks[i]
 
 
 def _twins(mesh: TriangleMesh) -> IntArray:
@@ -134,17 +147,15 @@ def _breaks(walk: IntArray, twins: IntArray, following: IntArray) -> IntArray:
     return np.flatnonzero(~(is_hem | goes_on))
 
 
-def _started(walk: IntArray, twins: IntArray, following: IntArray) -> IntArray:
+def _started(mesh: TriangleMesh, walk: IntArray, twins: IntArray, following: IntArray) -> IntArray:
     """Return a border that starts where a side begins.
 
-    A border without such a place starts with its smallest half-edge, or opposite where its partner starts.
+    A border without such a place starts at the vertex that is last by position, as does its partner.
     """
     breaks = _breaks(walk, twins, following)
     if len(breaks):
         return np.roll(walk, -breaks[0])
-    partners = twins[walk]
-    is_first = partners[0] < 0 or walk.min() < partners.min()
-    return np.roll(walk, -int(walk.argmin() if is_first else (partners.argmin() + 1) % len(walk)))
+    return np.roll(walk, -int((mesh.vertices[mesh.tails[walk]] @ DIRECTION).argmax()))
 
 
 def _sides(
@@ -156,21 +167,77 @@ def _sides(
         yield Side(int(surface.pieces[part[0] // 3]), points, part)
 
 
-def _seams(surface: CutSurface, sides: Sequence[Side], twins: IntArray) -> Iterator[Seam]:
-    by_first = {int(side.halfedges[0]): side for side in sides}
-    number = 0
-    for side in sides:
-        last = int(twins[side.halfedges[-1]])
-        if last < 0 or last not in by_first:
+def _seams(surface: CutSurface, sides: Sequence[Sequence[Sequence[Side]]], twins: IntArray) -> Iterator[Seam]:
+    """Yield the seams in the order of their names.
+
+    Args:
+        surface: the surface.
+        sides: of each piece and each of its borders, the sides.
+        twins: (3m,) the half-edge on the other side of each half-edge.
+    """
+    borders = [border for borders_of_piece in sides for border in borders_of_piece]
+    by_first = {int(side.halfedges[0]): side for border in borders for side in border}
+    partners = {
+        start: by_first[last]
+        for start, side in by_first.items()
+        if (last := int(twins[side.halfedges[-1]])) in by_first
+    }
+    numbers: dict[int, int] = {}
+    for side in _along_borders(surface, borders, partners, numbers):
+        start, partner = int(side.halfedges[0]), partners.get(int(side.halfedges[0]))
+        if partner is None or partner is side or start in numbers:
             continue
-        partner = by_first[last]
-        if side.halfedges.min() < partner.halfedges.min():
-            yield _seam(surface, letters(number), side, partner)
-            number += 1
+        number = len(numbers) // 2
+        numbers[start] = numbers[int(partner.halfedges[0])] = number
+        yield _seam(surface, letters(number), side, partner)
 
 
-def _hems(sides: Sequence[Side], twins: IntArray) -> Iterator[Side]:
-    return (side for side in sides if twins[side.halfedges[0]] < 0)
+def _along_borders(
+    surface: CutSurface,
+    borders: Sequence[Sequence[Side]],
+    partners: Mapping[int, Side],
+    numbers: Mapping[int, int],
+) -> Iterator[Side]:
+    """Yield all sides in the order in which their seams are numbered.
+
+    Where pieces have an order, sides at the following piece come first. Each border begins after the side with the
+    smallest number that is followed by one without a number, or at its longest side.
+
+    Args:
+        surface: the surface.
+        borders: the sides of all borders.
+        partners: the other side of the seam of each side, by the first half-edge of the side.
+        numbers: the number of each side by its first half-edge; sides get their numbers when they are yielded.
+    """
+    if surface.sequence is not None:
+        count = int(surface.pieces.max()) + 1
+        for side in (side for border in borders for side in border):
+            partner = partners.get(int(side.halfedges[0]))
+            if partner is not None and partner.piece == (side.piece + 1) % count:
+                yield side
+    for border in borders:
+        starts = [int(side.halfedges[0]) for side in border]
+        after = [
+            (numbers[starts[i - 1]], i)
+            for i, start in enumerate(starts)
+            if start not in numbers and starts[i - 1] in numbers
+        ]
+        first = min(after)[1] if after else _longest(surface, border)
+        yield from (*border[first:], *border[:first])
+
+
+def _longest(surface: CutSurface, border: Sequence[Side]) -> int:
+    """Return the index of the longest side of a border on the surface."""
+    mesh = surface.mesh
+    lengths = [surface.edge_lengths[mesh.halfedge_edges[side.halfedges]].sum() for side in border]
+    centres = [mesh.vertices[mesh.tails[side.halfedges]].mean(axis=0) for side in border]
+    return int(order_by_size(np.array(lengths), np.array(centres))[0])
+
+
+def _hems(sides: Sequence[Sequence[Sequence[Side]]], twins: IntArray) -> Iterator[Side]:
+    return (
+        side for borders in sides for border in borders for side in border if twins[side.halfedges[0]] < 0
+    )
 
 
 def _seam(surface: CutSurface, name: str, first: Side, second: Side) -> Seam:

@@ -9,8 +9,9 @@ import numpy as np
 
 from ... import Flattening, TriangleMesh
 from ...base import BoolArray, FloatArray, IntArray, mask_of
-from ...geometry import find_overlaps
+from ...geometry import double_areas, edge_lengths, find_overlaps
 from ...mesh import label_faces, open_along, point_seams, point_vertices
+from .numbering import order_by_size
 from .strain import FlatEdges
 
 
@@ -22,11 +23,13 @@ class CutSurface:
         mesh: the mesh.
         corners: (m, 3) the point of each triangle corner.
         points: (u, 2) the points.
+        sequence: (m,) the number of the piece of each triangle, if pieces have an order; None: by area.
     """
 
     mesh: TriangleMesh
     corners: IntArray
     points: FloatArray
+    sequence: IntArray | None = None
 
     @classmethod
     def of(cls, result: Flattening) -> CutSurface:
@@ -66,12 +69,14 @@ class CutSurface:
 
     @cached_property
     def pieces(self) -> IntArray:
-        """(m,) the piece of each triangle, from 0, in the order of their first triangles."""
-        label = label_faces(self.corners, len(self.points))[1]
-        _, first, inverse = np.unique(label, return_index=True, return_inverse=True)
-        rank = np.empty(len(first), dtype=np.int64)
-        rank[np.argsort(first)] = np.arange(len(first))
-        return rank[inverse.reshape(-1)]
+        """(m,) the piece of each triangle, from 0, in their order, or else the largest first."""
+        if self.sequence is not None:
+            return self.sequence
+        label = np.unique(label_faces(self.corners, len(self.points))[1], return_inverse=True)[1].reshape(-1)
+        areas, centres = piece_areas(self.mesh, label)
+        rank = np.empty(len(areas), dtype=np.int64)
+        rank[order_by_size(areas, centres)] = np.arange(len(areas))
+        return rank[label]
 
     @cached_property
     def piece_of_point(self) -> IntArray:
@@ -96,12 +101,24 @@ class CutSurface:
         flat = (self.places if places is None else places).reshape(-1, 2)
         count = np.bincount(corners.ravel())
         sums = np.stack([np.bincount(corners.ravel(), column) for column in flat.T], axis=1)
-        return replace(self, corners=corners, points=sums / count[:, None])
+        return replace(self, corners=corners, points=sums / count[:, None], sequence=None)
 
     def overlaps(self) -> IntArray:
         """Return (k, 2) the pairs of triangles of the same piece that overlap."""
         apart = 1.5 * self.piece_of_point * np.ptp(self.points, axis=0).max()
         return find_overlaps((self.points + np.stack([apart, 0 * apart], axis=1))[self.corners]).pairs
+
+
+def piece_areas(mesh: TriangleMesh, pieces: IntArray) -> tuple[FloatArray, FloatArray]:
+    """Return (k,) the areas of pieces on a surface, and (k, 3) their centres of area.
+
+    pieces: (m,) the piece of each triangle.
+    """
+    areas = double_areas(edge_lengths(mesh.vertices, mesh.faces)) / 2
+    moments = areas[:, None] * mesh.vertices[mesh.faces].mean(axis=1)
+    sums = np.bincount(pieces, areas).astype(np.float64)
+    centres = np.stack([np.bincount(pieces, column) for column in moments.T], axis=1)
+    return sums, centres / np.maximum(sums, np.finfo(float).tiny)[:, None]
 
 
 def lengths_of_edges(mesh: TriangleMesh) -> FloatArray:

@@ -36,10 +36,11 @@ class Text:
 
     Attributes:
         text: one line.
-        place: (2,) its centre, mm, y upward.
+        place: (2,) its centre, or the middle of its left end, mm, y upward.
         size: height of capitals, mm.
         angle: radians, counterclockwise.
         layer: one of `LAYERS`.
+        is_left: whether the text begins at its place.
     """
 
     text: str
@@ -47,6 +48,7 @@ class Text:
     size: float
     angle: float = 0.0
     layer: str = "text"
+    is_left: bool = False
 
 
 @dataclass(frozen=True, eq=False)

@@ -89,4 +89,5 @@ def _add_text(space: Any, text: Text) -> None:
 
     look = {"layer": text.layer, "rotation": float(np.degrees(text.angle))}
     entity = space.add_text(text.text, height=text.size, dxfattribs=look)
-    entity.set_placement(np.asarray(text.place).tolist(), align=TextEntityAlignment.MIDDLE_CENTER)
+    align = TextEntityAlignment.MIDDLE_LEFT if text.is_left else TextEntityAlignment.MIDDLE_CENTER
+    entity.set_placement(np.asarray(text.place).tolist(), align=align)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -11,9 +12,11 @@ from ...base import FloatArray, plural
 from .drawing import Drawing, Text
 from .finish import Finish
 from .pages import Page, Picture, cut_shapes, page_map, ruler
-from .papers import IN_INCHES, MARGIN, OVERLAP, Paper
+from .papers import IN_INCHES, MARGIN, Paper
 from .report import piece_sizes
 from .result import Pattern
+from .steps import steps_of
+from .strain_map import is_strained, percentage, strain_map
 from .tables import Table, laid_out
 from .tiling import tiles_of
 from .units import area_text, text_of_size
@@ -22,9 +25,14 @@ from .views import View, eye_and_up, view_of
 # Pixels of pictures per millimetre: 200 per inch.
 PIXELS = 200 / 25.4
 # Heights of capitals: titles, texts and numbers of pieces on pictures at most, mm; distance of lines of text.
-TITLE, BODY, NUMBER, LEADING = 5.0, 2.2, 3.4, 4.2
-# Height of the pictures relative to that of the page.
-PICTURES = 0.4
+TITLE, BODY, NUMBER, LEADING = 5.0, 2.3, 3.4, 4.4
+# Width of the numbers of a list, mm.
+INDENT = 6.0
+# Height of the pictures relative to that of the page, and the smallest one.
+PICTURES, MIN_PICTURES = 0.4, 0.15
+# Widths of a column of text beside the map of the pages, or that of the strain alone, relative to the page; mean width
+# of a character of longer texts relative to the height of capitals.
+TEXT_SHARE, HALF, CHARACTER = 0.66, 0.5, 0.76
 # Space between parts of a page, mm.
 SPACE = 5.0
 
@@ -42,7 +50,7 @@ def guide_pages(pattern: Pattern, drawing: Drawing, paper: Paper, title: str) ->
     tables = [_piece_table(pattern, drawing, paper), *_seam_tables(pattern)]
     low = np.array([MARGIN, MARGIN])
     high = np.array([own_paper.width, own_paper.height], dtype=np.float64) - MARGIN
-    return [_overview(pattern, drawing, paper, own_paper, title), *_table_pages(tables, low, high)]
+    return [*_overview(pattern, drawing, paper, own_paper, title), *_table_pages(tables, low, high)]
 
 
 def _table_pages(tables: list[Table], low: FloatArray, high: FloatArray) -> Iterator[Page]:
@@ -51,29 +59,48 @@ def _table_pages(tables: list[Table], low: FloatArray, high: FloatArray) -> Iter
         yield Page(Drawing(float(width), float(height), tuple(lines), tuple(texts)))
 
 
-def _overview(pattern: Pattern, drawing: Drawing, paper: Paper, own_paper: Paper, title: str) -> Page:
+def _overview(
+    pattern: Pattern, drawing: Drawing, paper: Paper, own_paper: Paper, title: str
+) -> Iterator[Page]:
+    """Yield the first page, and a page of notes if there is no room for them."""
     width, height = own_paper.inner_width, own_paper.inner_height
+    tiles = tiles_of(cut_shapes(drawing), drawing.width, drawing.height, paper)
+    rulers = ruler(np.array([MARGIN, MARGIN]), own_paper)
+    bottom = MARGIN + (25.0 if own_paper.name in IN_INCHES else 14.0)
     top = MARGIN + height
-    texts = [Text(title, np.array([MARGIN + width / 2, top - TITLE / 2]), TITLE)]
+    texts = [Text(title, np.array([MARGIN, top - TITLE / 2]), TITLE, is_left=True)]
     top -= TITLE + SPACE
     texts += _lines_of_text(_summary(pattern), width, top)
     top = min(float(text.place[1]) for text in texts) - SPACE
-    pictures, numbers = _pictures(pattern, width, PICTURES * height, top)
-    texts += numbers
-    top -= PICTURES * height + SPACE
-    about = [
-        *_lines_of_text([*_how_to_read(pattern), *_how_to_join(drawing, paper), *pattern.notes], width, top)
-    ]
-    texts += about
-    top = min(float(text.place[1]) for text in about) - SPACE
-    rulers = ruler(np.array([MARGIN, MARGIN]), own_paper)
+    # The map is beside the text. Pictures are smaller where steps need their room.
+    has_map, has_strain = len(tiles) > 1 and paper.height is not None, is_strained(pattern)
+    column = (TEXT_SHARE if has_map else HALF if has_strain else 1.0) * width
+    steps = [*_list_of_text(steps_of(pattern, tiles, paper), column, 0.0)]
+    room = top - bottom + float(steps[-1].place[1]) - 3 * SPACE
+    picture_height = max(min(PICTURES * height, room), MIN_PICTURES * height)
+    pictures, numbers = _pictures(pattern, width, picture_height, top)
+    top -= picture_height + SPACE
+    texts += [*numbers, *(replace(text, place=text.place + np.array([0.0, top])) for text in steps)]
+    text_top = top + float(steps[-1].place[1]) - SPACE
+    notes = [*_list_of_text(pattern.notes, column, text_top, numbered=False)]
+    have_room = not notes or float(notes[-1].place[1]) > bottom
+    texts += notes if have_room else []
     lines, texts = [*rulers.lines], [*texts, *rulers.texts]
-    bottom = MARGIN + (25.0 if own_paper.name in IN_INCHES else 14.0)
-    if paper.height is not None and top - bottom > 2 * SPACE:
-        small = page_map(drawing, paper, np.array([MARGIN, bottom]), np.array([width, top - bottom]))
+    # Both maps share the column beside the text.
+    place = np.array([MARGIN + column + SPACE, bottom])
+    extent = np.array([width - column - SPACE, (top - bottom) / (has_map + has_strain or 1)])
+    if has_strain:
+        strain_pictures, legend = strain_map(pattern, place, extent - np.array([0.0, has_map * SPACE]))
+        pictures, texts = [*pictures, *strain_pictures], [*texts, *legend.texts]
+        place = place + np.array([0.0, extent[1]])
+    if has_map:
+        small = page_map(drawing, paper, place, extent)
         lines, texts = [*lines, *small.lines], [*texts, *small.texts]
-    page = Drawing(width + 2 * MARGIN, height + 2 * MARGIN, tuple(lines), tuple(texts))
-    return Page(page, pictures=tuple(pictures))
+    size = width + 2 * MARGIN, height + 2 * MARGIN
+    yield Page(Drawing(*size, tuple(lines), tuple(texts)), pictures=tuple(pictures))
+    if not have_room:
+        notes = [*_list_of_text(pattern.notes, width, MARGIN + height, numbered=False)]
+        yield Page(Drawing(*size, (), tuple(notes)))
 
 
 def _pictures(pattern: Pattern, width: float, height: float, top: float) -> tuple[list[Picture], list[Text]]:
@@ -104,66 +131,42 @@ def _numbers(view: View, low: FloatArray, width: float, height: float) -> Iterat
 def _summary(pattern: Pattern) -> list[str]:
     """Return what the pattern is, in a few lines."""
     extents = np.ptp(pattern.surface.mesh.vertices, axis=0).tolist()
-    seams = plural(len(pattern.seams) - len(pattern.darts), "seam")
-    darts = f", {plural(len(pattern.darts), 'dart')}" if pattern.darts else ""
+    count = sum(not seam.is_dart for seam in pattern.seams)
+    seams = f", {plural(count, 'seam')}" if count else ""
+    cuts, noun = (pattern.darts, "dart") if pattern.is_sewn else (pattern.corner_cuts, "corner cut")
+    darts = f", {plural(len(cuts), noun)}" if cuts else ""
     strain = float(np.abs(pattern.strains).max())
-    stretched = f"; lengths change by at most {100 * strain:.2g} %" if strain > 1e-6 else ""
+    stretched = f"; lengths change by at most {percentage(strain)}" if strain > 1e-6 else ""
     finish = Finish.of(pattern.kind, pattern.settings)
     allowance = (
         f"seam allowance {finish.allowance:g} mm, included" if finish.allowance else "no seam allowance"
     )
     return [
-        f"{pattern.kind}: {plural(pattern.piece_count, 'piece')}, {seams}{darts}; "
+        f"{pattern.kind}: {plural(pattern.piece_count, 'piece')}{seams}{darts}; "
         f"finished size {text_of_size(extents)}",
         f"{allowance}{stretched}",
     ]
 
 
-def _how_to_read(pattern: Pattern) -> Iterator[str]:
-    """Yield what the lines and texts mean."""
-    if pattern.piece_count > 1:
-        yield "A (2) at a side: this is seam A, and piece 2 is on the other side of it. Solid black lines are cut."
-    else:
-        yield "Sides with the same name meet. Solid black lines are cut."
-    if pattern.is_sewn:
-        yield (
-            "Grey dashed lines are sewn. Notches match on both sides of a seam; the double one is the same on both. "
-            "The arrow is the grain."
-        )
-    if pattern.darts:
-        yield "A dart is sewn together along its two sides, from the border to its tip, which is marked by a circle."
-    if len(pattern.folds) or pattern.bends or pattern.tabs:
-        yield (
-            "Blue lines are folded: away from you where dash-dotted (mountains), towards you where dashed (valleys), "
-            "by the angle that is written there."
-        )
-    if any(bend.radius for bend in pattern.bends):
-        yield "R is the radius of a bend of the surface, mm; its line is the middle of what is bent."
-    eased = [seam for seam in pattern.seams if seam.is_eased]
-    if eased:
-        yield f"{plural(len(eased), 'seam')} with sides of different lengths: ease in the longer side evenly."
+def _list_of_text(items: Sequence[str], width: float, top: float, numbered: bool = True) -> Iterator[Text]:
+    """Yield the lines of a list, from the top downward: with numbers, or with dots."""
+    columns = int((width - INDENT) / (CHARACTER * BODY))
+    y = top - BODY / 2
+    for i, item in enumerate(items):
+        mark = f"{i + 1}." if numbered else "\u2022"
+        yield Text(mark, np.array([MARGIN, y]), BODY, is_left=True)
+        for line in textwrap.wrap(item, columns):
+            yield Text(line, np.array([MARGIN + INDENT, y]), BODY, is_left=True)
+            y -= LEADING
+        y -= LEADING / 4
 
 
-def _how_to_join(drawing: Drawing, paper: Paper) -> Iterator[str]:
-    if paper.height is None:
-        return
-    tiles = tiles_of(cut_shapes(drawing), drawing.width, drawing.height, paper)
-    yield "Print at 100 % (actual size), without fitting to the page, and measure the ruler below."
-    if len(tiles) > 1 and tiles[0].overlaps:
-        yield (
-            f"Pages overlap by {OVERLAP:g} mm: cut along the marks on one side, and join them so that the lines meet. "
-            "The map shows which page is where."
-        )
-    elif len(tiles) > 1:
-        yield "No piece crosses the border of a page."
-
-
-def _lines_of_text(paragraphs: list[str], width: float, top: float) -> Iterator[Text]:
-    """Yield centred lines of text from the top downward."""
-    columns = int(width / (0.78 * BODY))
+def _lines_of_text(paragraphs: Sequence[str], width: float, top: float) -> Iterator[Text]:
+    """Yield lines of text from the top downward."""
+    columns = int(width / (CHARACTER * BODY))
     lines = [line for paragraph in paragraphs for line in textwrap.wrap(paragraph, columns)]
     for i, line in enumerate(lines):
-        yield Text(line, np.array([MARGIN + width / 2, top - i * LEADING - BODY / 2]), BODY)
+        yield Text(line, np.array([MARGIN, top - i * LEADING - BODY / 2]), BODY, is_left=True)
 
 
 def _piece_table(pattern: Pattern, drawing: Drawing, paper: Paper) -> Table:
@@ -195,8 +198,8 @@ def _seam_tables(pattern: Pattern) -> Iterator[Table]:
     for seam in pattern.seams:
         first, second = (side.piece + 1 for side in seam.sides)
         pieces = (
-            f"dart in {first}"
-            if seam in pattern.darts
+            f"{'dart' if pattern.is_sewn else 'corner cut'} in {first}"
+            if seam.is_dart
             else f"{first} and {second}"
             if first != second
             else f"{first}, itself"

@@ -110,6 +110,8 @@ def box_of(text: Text) -> Polygon:
     """Return the rectangle that a text covers."""
     half = np.array([text_width(text.text, text.size), LINE_HEIGHT * text.size]) / 2
     corners = half * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
+    if text.is_left:
+        corners[:, 0] += half[0]
     return shapely().Polygon(np.asarray(text.place) + rotated(corners, text.angle))
 
 

@@ -6,18 +6,21 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
 from numpy.typing import ArrayLike
 
-from ...base import component_at_work, plural, timing, warns
+from ...base import FloatArray, component_at_work, plural, timing, warns
 from ...options import read_options, settings, takes
 from .cloth import cloth_pieces
+from .cut_surface import piece_areas
 from .development import Development
 from .finish import Finish
 from .gaps import notes_on_gaps
 from .gores import cut_gores
 from .model import Model, read_model
-from .nesting import nested
+from .nesting import grain_up, nested
 from .net import unfold_net
+from .numbering import order_around
 from .options import PatternOptions
 from .result import Pattern
 from .sheet import develop_sheet
@@ -64,7 +67,15 @@ def pattern(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Patter
 
 
 def _cloth(model: Model, options: PatternOptions) -> Development:
-    return cloth_pieces(model, options)
+    # The only axis of cloth is its grain.
+    return cloth_pieces(replace(model, axis=_grain(model, options)), options)
+
+
+def _grain(model: Model, options: PatternOptions) -> FloatArray:
+    """Return (3,) the direction of the grain; without one, the upward direction."""
+    if not isinstance(options.grain, tuple):
+        return model.axis
+    return np.array(options.grain) / np.linalg.norm(options.grain)
 
 
 def _net(model: Model, options: PatternOptions) -> Development:
@@ -72,7 +83,13 @@ def _net(model: Model, options: PatternOptions) -> Development:
 
 
 def _gores(model: Model, options: PatternOptions) -> Development:
-    return cut_gores(model.mesh, options.gores, model.axis)
+    developed = cut_gores(model.mesh, options.gores, model.axis)
+    surface = developed.surface
+    if isinstance(options.grain, tuple):
+        surface = grain_up(surface, _grain(model, options))
+    centres = piece_areas(surface.mesh, surface.pieces)[1]
+    rank = np.argsort(order_around(centres, model.axis))
+    return replace(developed, surface=replace(surface, sequence=rank[surface.pieces]))
 
 
 def _sheet(model: Model, options: PatternOptions) -> Development:
@@ -96,7 +113,11 @@ def _placed(model: Model, developed: Development, options: PatternOptions) -> Pa
         folds=developed.folds,
         fold_angles=developed.fold_angles,
         notes=(*model.notes, *developed.notes),
-        settings={**settings(options), "axis": tuple(model.axis.tolist())},
+        settings={
+            **settings(options),
+            "axis": tuple(model.axis.tolist()),
+            "grain": options.grain if options.grain == "none" else tuple(_grain(model, options).tolist()),
+        },
     )
     if options.kind == "net" and options.tabs > 0:
         glued = glue_tabs(developed.surface, result.borders, options.tabs)

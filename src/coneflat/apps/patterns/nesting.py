@@ -4,11 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ...atlas import Outlines, SheetPacking, pack_sheets, pack_strip, straight_angle
+from ...atlas import (
+    Outlines,
+    PageGrid,
+    SheetPacking,
+    pack_page_grid,
+    pack_sheets,
+    pack_strip,
+    rotated_boxes,
+    straight_angle,
+)
 from ...base import FloatArray
 from ...errors import OptionError
 from ...geometry import rotated_up, signed_double_areas
@@ -19,7 +30,7 @@ from .labels import rotated
 from .papers import EDGE, OVERLAP, Paper
 from .result import Pattern
 from .shapes import PieceShape, piece_shapes
-from .tiling import tiles_of
+from .tiling import crossings, tiles_of
 
 if TYPE_CHECKING:
     from shapely import Polygon
@@ -36,6 +47,8 @@ MAX_PAGES = 2000
 WIDTHS = (1.1, 1.3, 1.6)
 # Columns of pages side by side that are tried, around those of a square sheet.
 MORE_COLUMNS = 2
+# Rows of pages on which pieces may be placed, relative to those that their area fills.
+MORE_PAGES = 2.0
 # Angles tried for pieces without a grain: at most these, and so many for all pieces together.
 TURNS, MAX_PLACEMENTS = 16, 480
 
@@ -60,9 +73,9 @@ def grain_up(surface: CutSurface, axis: FloatArray) -> CutSurface:
 def nested(pattern: Pattern) -> Pattern:
     """Return a pattern with its pieces side by side, at least GAP apart, allowances and tabs included.
 
-    The grain of cloth and gores remains upward or downward; other pieces take any angle. Where each piece fits on a
+    A grain remains upward or downward; other pieces take any angle. Where each piece fits on a
     page, pieces are distributed over the fewest pages, and none crosses the border of one. Otherwise, pages are
-    put together to a sheet of the width at which there are fewest.
+    put together to a sheet on which the fewest are needed, and then the fewest pieces cross their borders.
 
     Raises:
         OptionError: a piece is wider than the roll, or options of the pattern cannot be met.
@@ -71,7 +84,7 @@ def nested(pattern: Pattern) -> Pattern:
     shapes = piece_shapes(
         pattern.surface, pattern.borders, Finish.of(pattern.kind, pattern.settings), pattern.tabs
     )
-    pieces = _Pieces(_outlines(shapes), _angles(shapes, pattern.is_sewn))
+    pieces = _Pieces(_outlines(shapes), _angles(shapes, pattern.has_grain))
     return _moved(pattern, _packed(pieces, shapes, paper))
 
 
@@ -83,12 +96,12 @@ class _Pieces:
     @property
     def narrowest(self) -> float:
         """The width that the widest piece needs at its best angle."""
-        sides = self.outlines.sides.ravel()
-        piece = np.repeat(np.arange(len(self.outlines)), 2 * np.diff(self.outlines.start))
-        turned = (sides[:, None] * np.exp(1j * self.angles[piece])).real
-        start = 2 * self.outlines.start[:-1]
-        widths = np.maximum.reduceat(turned, start) - np.minimum.reduceat(turned, start)
-        return float(widths.min(axis=1).max())
+        return float(self.extents.real.min(axis=1).max())
+
+    @cached_property
+    def extents(self) -> NDArray[np.complex128]:
+        """(k, t) the width of each piece at each angle, and i times its height."""
+        return rotated_boxes(self.outlines, self.angles)[1]
 
     def strip(self, width: float, tries: int = TRIES) -> SheetPacking | None:
         """Return the pieces on a strip of a width; None if one is wider."""
@@ -101,6 +114,20 @@ class _Pieces:
         width, height = paper.inner_width - 2 * EDGE, paper.inner_height - 2 * EDGE
         packing = pack_sheets(self.outlines, self.angles, GAP, width, height, _columns(width))
         return None if packing is None else _inset(packing)
+
+    def page_grid(self, paper: Paper, columns: int, area: float) -> SheetPacking | None:
+        """Return the pieces on pages that overlap, at most some columns of them; None if they have no place.
+
+        Args:
+            paper: the paper.
+            columns: the number of columns.
+            area: the area of the pieces, mm^2.
+        """
+        step = np.array([paper.inner_width, paper.inner_height]) - OVERLAP
+        tallest = self.extents.imag.min(axis=1).max() / step[1]
+        rows = int(np.ceil(MORE_PAGES * area / (columns * step.prod()) + tallest)) + 1
+        grid = PageGrid(paper.inner_width, paper.inner_height, OVERLAP, EDGE, columns, rows)
+        return pack_page_grid(self.outlines, self.angles, GAP, grid, _columns(columns * float(step[0])))
 
 
 def _inset(packing: SheetPacking) -> SheetPacking:
@@ -163,18 +190,25 @@ def _strips(pieces: _Pieces, widths: Sequence[float]) -> Iterator[tuple[float, S
 
 
 def _fewest_pages(pieces: _Pieces, shapes: Sequence[PieceShape], paper: Paper) -> SheetPacking:
-    """Return the pieces on a sheet of pages that overlap, of the width for which there are fewest pages."""
+    """Return the pieces on a sheet of pages that overlap, of which the fewest are needed.
+
+    Pieces on strips of several widths are compared with pieces that are placed page by page.
+    """
     step = paper.inner_width - OVERLAP
     min_columns = max(int(np.ceil((1.01 * pieces.narrowest + 2 * EDGE - OVERLAP) / step)), 1)
     area = sum(shape.cut.area for shape in shapes)
     square = max(round((1.2 * area) ** 0.5 / step), min_columns)
     counts = range(max(min_columns, square - MORE_COLUMNS), square + MORE_COLUMNS + 1)
     candidates = [packing for _, packing in _strips(pieces, [count * step + OVERLAP for count in counts])]
+    on_grid = pieces.page_grid(paper, square + 1, area)
+    if on_grid is not None:
+        candidates.append(on_grid)
 
-    def cost(packing: SheetPacking) -> tuple[int, float]:
+    def cost(packing: SheetPacking) -> tuple[int, int, float]:
         cut = _cut_out(shapes, packing)
         width, height = shapely().total_bounds(cut)[2:] + EDGE
-        return len(tiles_of(cut, width, height, paper)), width * height
+        tiles = tiles_of(cut, width, height, paper)
+        return len(tiles), crossings(cut, tiles), width * height
 
     return min(candidates, key=cost)
 

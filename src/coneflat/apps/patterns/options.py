@@ -17,11 +17,11 @@ if TYPE_CHECKING:
 KINDS = ("cloth", "net", "gores", "sheet")
 #: Largest number of gores: more would be narrower than their allowances.
 MAX_GORES = 200
-#: Options that only one kind has.
+#: Options that not all kinds have.
 OWN_OPTIONS = {
-    "cloth": ("strain", "stretch_warp", "stretch_weft", "darts", "seams", "tolerance"),
+    "cloth": ("strain", "stretch_warp", "stretch_weft", "darts", "seams", "tolerance", "grain"),
     "net": ("tabs",),
-    "gores": ("gores",),
+    "gores": ("gores", "grain"),
 }
 
 
@@ -43,7 +43,10 @@ class PatternOptions(RunOptions):
         tolerance: Largest distance from the surface at which seams of cloth are made smooth, and mean distance at which
             dense meshes are simplified; 0 for neither.
         gores: Number of strips from pole to pole.
-        axis: Direction from pole to pole, and of the grain; by default the upward direction of the model.
+        axis: Upward direction of the model, along which its height and the poles of gores are; by default that of
+            its format, or of its shape.
+        grain: Direction on the model along which the grain of cloth and gores is; by default the axis. none: pieces
+            have no grain, and are rotated to save material.
         allowance: Width of the seam allowance: 7 mm for cloth and gores by default, else 0.
         seam_allowances: Widths of single seams by name, such as A=10mm,B=0.
         corners: Corners of the allowance: mitred or round.
@@ -64,6 +67,7 @@ class PatternOptions(RunOptions):
     tolerance: float = option(0.5, Length())
     gores: int = option(12, Number(2, MAX_GORES, is_integer=True))
     axis: tuple[float, float, float] | None = option(None, Direction())
+    grain: tuple[float, float, float] | str | None = option(None, Direction(("none",)))
     allowance: float | None = option(None, Length(optional=True, maximum=MAX_ALLOWANCE))
     seam_allowances: str = option("", Allowances())
     corners: str = option("mitred", Choice(("mitred", "round")))
@@ -76,6 +80,10 @@ class PatternOptions(RunOptions):
         for name in _names_of_other_kinds(self.kind):
             if _differs(getattr(self, name), declarations(PatternOptions)[name].default):
                 raise OptionError(f"{name} and kind {self.kind} cannot be combined: leave out one of them")
+        if self.grain == "none" and (self.stretch_warp is not None or self.stretch_weft is not None):
+            raise OptionError(
+                "grain none and stretch_warp or stretch_weft cannot be combined: leave out one of them"
+            )
         if self.kind == "net" and self.allowance and self.tabs:
             raise OptionError("allowance and tabs of a net cannot be combined: give 0 as one of them")
         if self.lengths is not None:
@@ -88,4 +96,5 @@ def _differs(value: object, default: object) -> bool:
 
 def _names_of_other_kinds(kind: str) -> list[str]:
     """Return the names of the options that a kind of patterns does not have."""
-    return [name for other_kind, names in OWN_OPTIONS.items() for name in names if kind != other_kind]
+    names = dict.fromkeys(name for group in OWN_OPTIONS.values() for name in group)
+    return [name for name in names if name not in OWN_OPTIONS.get(kind, ())]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,11 +14,15 @@ from .drawing import Drawing, Line, Text
 from .finish import HEM, Finish
 from .labels import Labels
 from .notches import notches_of
-from .papers import EDGE
+from .papers import EDGE, Paper
 from .piece_texts import add_angle, add_grain, add_number, add_seam_name
 from .result import Pattern
 from .seam_names import names_of
 from .shapes import PieceShape, fold_of_tab, piece_shapes
+from .tiling import tiles_of
+
+if TYPE_CHECKING:
+    from shapely import Polygon
 
 # Dashes and gaps, mm: seam lines, folds away from the eye (mountains) and towards it (valleys).
 SEAM_DASHES, MOUNTAIN, VALLEY = (4.0, 2.0), (7.0, 1.5, 1.0, 1.5), (4.0, 2.5)
@@ -46,9 +51,10 @@ def drawing_of(pattern: Pattern) -> Drawing:
             room.cover(shapely().LineString(ends))
     for ends in pattern.folds:
         rooms.inside[piece_of_point[ends[0]]].avoid(shapely().LineString(points[ends]))
+    pages = _pages(pattern, shapes, float(width), float(height))
     for piece, room in enumerate(rooms.inside):
-        lines += add_number(room, rooms.outside, piece, shapes[piece].inside.area)
-        if pattern.is_sewn:
+        lines += add_number(room, rooms.outside, piece, shapes[piece].inside.area, pages)
+        if pattern.has_grain:
             lines += add_grain(room)
     for seam in sorted(pattern.seams, key=lambda seam: -min(seam.lengths)):
         for name in names_of(pattern.kind, seam, points, is_single=pattern.piece_count == 1):
@@ -86,6 +92,15 @@ class Rooms:
         """Yield all texts."""
         for room in (*self.inside, *self.allowances, self.outside):
             yield from room.texts
+
+
+def _pages(pattern: Pattern, shapes: Sequence[PieceShape], width: float, height: float) -> list[Polygon]:
+    """Return the rectangles of the pages onto which a pattern is tiled."""
+    paper = Paper.of(pattern.settings.get("page", "A4"))
+    if paper.height is None:
+        return []
+    tiles = tiles_of([shape.cut for shape in shapes], width, height, paper)
+    return [shapely().box(*tile.low, *tile.high) for tile in tiles]
 
 
 def _cut_lines(shapes: Sequence[PieceShape]) -> Iterator[Line]:

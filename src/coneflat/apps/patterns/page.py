@@ -10,7 +10,6 @@ import numpy as np
 
 from ... import Flattening, measure
 from ...base import FloatArray, IntArray, plural
-from ...geometry import edge_lengths
 from ...measures import angle_sum_errors
 from ...stages import SolveStatistics
 from ..view import PageParts, PageText, check_page, open_page, page_html, write_page
@@ -19,6 +18,7 @@ from .borders import Seam
 from .report import rows_of
 from .result import Pattern
 from .shapes import tails
+from .strain_map import percentage, side_strains
 
 # Strain up to which a pattern is as exact as numbers are.
 EXACT = 1e-6
@@ -27,11 +27,14 @@ EXACT = 1e-6
 def page_of_pattern(pattern: Pattern, *, name: str = "Pattern", show: str = "charts", **look: Any) -> str:
     """Return the HTML page of a pattern; arguments and errors are those of `page_html`."""
     strain = float(np.abs(pattern.strains).max())
-    parts = [plural(pattern.piece_count, "piece"), plural(len(pattern.seams) - len(pattern.darts), "seam")]
-    if pattern.is_sewn:
-        parts.append(plural(len(pattern.darts), "dart"))
+    cuts, noun = (pattern.darts, "dart") if pattern.is_sewn else (pattern.corner_cuts, "corner cut")
+    parts = [
+        plural(pattern.piece_count, "piece"),
+        plural(len(pattern.seams) - len(cuts), "seam"),
+        plural(len(cuts), noun),
+    ]
     if strain > EXACT:
-        parts.append(f"strain {100 * strain:.2g} %")
+        parts.append(f"strain {percentage(strain)}")
     text = PageText(title="  ·  ".join(parts), rows=rows_of(pattern))
     return page_html(as_flattening(pattern), name=name, show=show, text=text, parts=parts_of(pattern), **look)
 
@@ -87,22 +90,22 @@ def parts_of(pattern: Pattern) -> PageParts:
     seam_of_edge = np.empty(len(surface.mesh.edges), dtype=np.int64)
     for number, seam in enumerate(pattern.seams):
         seam_of_edge[surface.mesh.halfedge_edges[seam.sides[0].halfedges]] = number
-    darts = {seam.name for seam in pattern.darts}
     return PageParts(
         pieces=surface.pieces,
         anchors=_anchors(pattern),
         seams=seam_of_edge[surface.seams],
         seam_names=[seam.name for seam in pattern.seams],
-        seam_texts=[_seam_text(seam, seam.name in darts) for seam in pattern.seams],
-        strain=_strains(pattern),
+        seam_texts=[_seam_text(seam, pattern.is_sewn) for seam in pattern.seams],
+        strain=side_strains(pattern.surface),
         strain_title="Strain: largest change of a side, at true scale",
     )
 
 
-def _seam_text(seam: Seam, is_dart: bool) -> str:
+def _seam_text(seam: Seam, is_sewn: bool) -> str:
     length, shorter = max(seam.lengths), min(seam.lengths)
     eased = f" eased to {shorter:.1f} mm" if seam.is_eased else ""
-    return f"{'Dart' if is_dart else 'Seam'} {seam.name}, {length:.1f} mm{eased}"
+    noun = "Seam" if not seam.is_dart else "Dart" if is_sewn else "Corner cut"
+    return f"{noun} {seam.name}, {length:.1f} mm{eased}"
 
 
 def _tips(pattern: Pattern) -> IntArray:
@@ -130,12 +133,3 @@ def _depths(places: FloatArray, point: FloatArray) -> FloatArray:
     sides, to_point = np.roll(places, -1, axis=1) - places, point - places
     across = sides[..., 0] * to_point[..., 1] - sides[..., 1] * to_point[..., 0]
     return np.asarray((across / np.linalg.norm(sides, axis=2)).min(axis=1))
-
-
-def _strains(pattern: Pattern) -> FloatArray:
-    """Return (m,) the relative change of length of the side of each triangle that changes most."""
-    surface = pattern.surface
-    flat = edge_lengths(np.pad(surface.points, ((0, 0), (0, 1))), surface.corners)
-    strains = flat / edge_lengths(surface.mesh.vertices, surface.mesh.faces) - 1
-    largest = np.abs(strains).argmax(axis=1)[:, None]
-    return np.take_along_axis(strains, largest, axis=1)[:, 0]

@@ -106,5 +106,6 @@ def _draw_text(canvas: Any, text: Text) -> None:
     canvas.translate(*np.asarray(text.place).tolist())
     canvas.rotate(float(np.degrees(text.angle)))
     canvas.setFont(FONT, text.size / CAPITALS)
-    canvas.drawCentredString(0, -text.size / 2, text.text)
+    draw = canvas.drawString if text.is_left else canvas.drawCentredString
+    draw(0, -text.size / 2, text.text)
     canvas.restoreState()

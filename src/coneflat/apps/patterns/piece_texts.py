@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from itertools import product
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,6 +14,9 @@ from .drawing import Line, Text
 from .labels import LINE_HEIGHT, Labels, readable_angle, text_width
 from .polylines import distances
 from .units import area_text
+
+if TYPE_CHECKING:
+    from shapely import Polygon
 
 # Factors of the height of a number that stands alone.
 NUMBER_FACTORS = (1.6, 1.2, 1.0, 0.75, 0.5)
@@ -34,14 +38,21 @@ GRAINS = ((0.7, 0.5), (0.35, 0.5), (0.3, 0.75), (0.3, 0.25), (0.15, 0.7), (0.15,
 CENTRE_ACCURACY = 0.01
 
 
-def add_number(room: Labels, outside: Labels, piece: int, area: float) -> Iterator[Line]:
+def add_number(
+    room: Labels, outside: Labels, piece: int, area: float, pages: Sequence[Polygon]
+) -> Iterator[Line]:
     """Place the number of a piece, its count and area around the centre of the largest circle inside.
 
     In a tiny piece, the number is placed outside; yield the line that leads to it.
+
+    Args:
+        room: the piece.
+        outside: what is outside of all pieces.
+        piece: the piece, from 0.
+        area: its area, mm^2.
+        pages: the rectangles of the pages, if there are several: the circle is on one of them.
     """
-    extent = np.ptp(np.asarray(room.shape.exterior.coords), axis=0).max()
-    circle = shapely().maximum_inscribed_circle(room.shape, tolerance=CENTRE_ACCURACY * float(extent))
-    centre, radius = np.asarray(circle.coords)[0], float(circle.length)
+    centre, radius = _largest_circle(room.shape, pages)
     size = min(max(NUMBER_PER_RADIUS * radius, MIN_TEXT), MAX_NUMBER)
     below = max(BELOW_NUMBER * size, MIN_TEXT)
     number, details = str(piece + 1), f"cut 1 \u00b7 {area_text(area)}"
@@ -65,6 +76,19 @@ def add_number(room: Labels, outside: Labels, piece: int, area: float) -> Iterat
         away = text.place - centre
         end = centre + away * (1 - OUTSIDE_NUMBER / np.linalg.norm(away))
         yield Line("mark", np.array([centre, end]))
+
+
+def _largest_circle(shape: Polygon, pages: Sequence[Polygon]) -> tuple[FloatArray, float]:
+    """Return the centre and the radius of the largest circle in a shape, and on one of some pages if there are any."""
+    accuracy = CENTRE_ACCURACY * float(np.ptp(np.asarray(shape.exterior.coords), axis=0).max())
+    on_pages = [shape.intersection(page) for page in pages if page.intersects(shape)]
+    parts = [part for on_page in on_pages for part in shapely().get_parts(on_page) if part.area > 0]
+    circles = [
+        shapely().maximum_inscribed_circle(part, tolerance=accuracy)
+        for part in (parts if len(on_pages) > 1 else [shape])
+    ]
+    circle = max(circles, key=lambda line: round(float(line.length), 6))
+    return np.asarray(circle.coords)[0], float(circle.length)
 
 
 def _directions() -> FloatArray:

@@ -11,13 +11,14 @@ from .finish import Finish
 from .papers import EDGE, Paper
 from .result import Pattern
 from .shapes import piece_shapes
+from .strain_map import percentage
 from .tiling import tiles_of
 from .units import text_of_size
 
 #: Numbers of the report, which `--require` takes.
 PATTERN_MEASURES = (
-    "pieces", "seams", "darts", "eased_seams", "ease_max", "seam_length", "strain_max", "strain_mean", "area",
-    "sheet_width", "sheet_height", "sheet_share", "pages", "millimetres_per_unit",
+    "pieces", "seams", "darts", "corner_cuts", "eased_seams", "ease_max", "seam_length", "strain_max", "strain_mean",
+    "area", "sheet_width", "sheet_height", "sheet_share", "pages", "millimetres_per_unit",
 )  # fmt: skip
 
 
@@ -36,7 +37,8 @@ def report_of(pattern: Pattern) -> dict[str, Any]:
             "lengths": list(seam.lengths),
             "surface_length": seam.surface_length,
             "ease": seam.ease if seam.is_eased else 0.0,
-            "is_dart": seam in pattern.darts,
+            "is_dart": seam.is_dart and pattern.is_sewn,
+            "is_corner_cut": seam.is_dart and not pattern.is_sewn,
         }
         for seam in pattern.seams
     ]
@@ -46,6 +48,7 @@ def report_of(pattern: Pattern) -> dict[str, Any]:
         "pieces": pattern.piece_count,
         "seams": len(pattern.seams),
         "darts": len(pattern.darts),
+        "corner_cuts": len(pattern.corner_cuts),
         "eased_seams": sum(seam.is_eased for seam in pattern.seams),
         "ease_max": max((seam.ease for seam in pattern.seams), default=0.0),
         "seam_length": pattern.surface.seam_length,
@@ -79,17 +82,18 @@ def rows_of(pattern: Pattern, report: dict[str, Any] | None = None) -> list[tupl
     size = text_of_size(np.ptp(pattern.surface.mesh.vertices, axis=0))
     axis = np.array(pattern.settings.get("axis", (0.0, 0.0, 1.0)))
     along = " ".join(f"{number:.3g}" for number in axis)
-    rows = [
+    noun = "darts" if pattern.is_sewn else "corner cuts"
+    return [
         ("size", size, f"of the finished object along x, y and z; its height is along {along}"),
         ("pieces", f"{report['pieces']}", f"{report['area'] / 100:.0f} cm\u00b2 in total"),
         (
             "seams",
-            f"{report['seams'] - report['darts']}",
+            f"{report['seams'] - report['darts'] - report['corner_cuts']}",
             eased if report["eased_seams"] else "sides equally long",
         ),
-        ("darts", f"{report['darts']}", "ends of seams inside a piece"),
+        (noun, f"{report['darts'] + report['corner_cuts']}", "cuts that end inside a piece"),
         ("seam length", f"{report['seam_length']:.0f} mm", "on the model, darts included"),
-        ("strain", f"{100 * report['strain_max']:.2g} %", "largest relative change of the length of an edge"),
+        ("strain", percentage(report["strain_max"]), "largest relative change of the length of an edge"),
         (
             "sheet",
             f"{report['sheet_width']:.0f} x {report['sheet_height']:.0f} mm",
@@ -97,7 +101,6 @@ def rows_of(pattern: Pattern, report: dict[str, Any] | None = None) -> list[tupl
         ),
         ("pages", f"{report['pages']}", f"{pattern.settings.get('page', 'A4')}, without the assembly guide"),
     ]
-    return rows if pattern.is_sewn else [row for row in rows if row[0] != "darts"]
 
 
 def piece_sizes(pattern: Pattern) -> list[tuple[float, float, float]]:

@@ -32,7 +32,7 @@ class Pattern:
     Attributes:
         kind: cloth, net, gores or sheet.
         surface: the surface at its final size, cut into pieces, which lie side by side in the plane without overlap,
-            the grain along the second axis.
+            the grain, if there is one, along the second axis.
         millimetres: millimetres per unit of the model.
         folds: (f, 2) points of fold lines inside pieces, and `fold_angles` (f,) their dihedral angles in radians,
             positive for mountain folds, negative for valleys.
@@ -69,8 +69,13 @@ class Pattern:
 
     @property
     def is_sewn(self) -> bool:
-        """Whether it is a pattern for cloth, with seam allowances, notches, darts and a grain."""
+        """Whether it is a pattern for cloth, with seam allowances, notches and darts."""
         return self.kind in SEWN
+
+    @property
+    def has_grain(self) -> bool:
+        """Whether pieces have a grain, and are turned by half turns only."""
+        return self.is_sewn and self.settings.get("grain") != "none"
 
     @property
     def seams(self) -> tuple[Seam, ...]:
@@ -81,6 +86,11 @@ class Pattern:
     def darts(self) -> tuple[Seam, ...]:
         """The seams that end in a tip inside a piece; none in nets and sheets, which are not sewn."""
         return tuple(seam for seam in self.seams if seam.is_dart and self.is_sewn)
+
+    @property
+    def corner_cuts(self) -> tuple[Seam, ...]:
+        """The cuts of nets and sheets that end inside a piece, as at the corners of a tray; its sides are joined."""
+        return tuple(seam for seam in self.seams if seam.is_dart and not self.is_sewn)
 
     @cached_property
     def bends(self) -> tuple[Bend, ...]:

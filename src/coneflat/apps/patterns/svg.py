@@ -67,7 +67,7 @@ def _append_text(group: ElementTree.Element, text: Text, height: float) -> None:
             "y": _number(text.size / 2),  # the base line
             "font-family": "Helvetica, Arial, sans-serif",
             "font-size": _number(text.size / CAPITALS),
-            "text-anchor": "middle",
+            "text-anchor": "start" if text.is_left else "middle",
             "fill": PENS[text.layer].colour,
             "stroke": "none",
         },

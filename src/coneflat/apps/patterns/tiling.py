@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import ceil
 from typing import TYPE_CHECKING
@@ -12,7 +12,7 @@ import numpy as np
 from ...base import FloatArray
 from .allowances import shapely
 from .borders import letters
-from .papers import OVERLAP, Paper
+from .papers import EDGE, OVERLAP, Paper
 
 if TYPE_CHECKING:
     from shapely import Polygon
@@ -53,7 +53,7 @@ def tiles_of(shapes: Sequence[Polygon], width: float, height: float, paper: Pape
     if paper.height is not None:
         size = np.array([paper.inner_width, paper.inner_height])
     side_by_side = _tiles(shapes, width, height, size, 0.0)
-    if _are_whole(shapes, side_by_side):
+    if not crossings(shapes, side_by_side):
         return side_by_side
     return _tiles(shapes, width, height, size, OVERLAP)
 
@@ -71,12 +71,7 @@ def _tiles(
         for row in range(counts[1])
         for column in range(counts[0])
     }
-    covered = {
-        place
-        for place, low in corners.items()
-        if shapely().area(shapely().intersection(np.array(shapes), shapely().box(*low, *(low + size)))).max()
-        > ROUNDING
-    }
+    covered = _needed(shapes, corners, size)
 
     def name(row: int, column: int) -> str:
         return f"{letters(row)}{column + 1}" if (row, column) in covered else ""
@@ -94,12 +89,41 @@ def _tiles(
     ]
 
 
-def _are_whole(shapes: Sequence[Polygon], tiles: Sequence[Tile]) -> bool:
-    """Return whether each shape is on a single tile."""
+def _needed(
+    shapes: Sequence[Polygon], corners: Mapping[tuple[int, int], FloatArray], size: FloatArray
+) -> set[tuple[int, int]]:
+    """Return the places of the tiles that are needed: with something on them that no other one of them shows.
+
+    Args:
+        shapes: what is cut out of the sheet.
+        corners: the lower left corner of the tile of each row and column.
+        size: (2,) the size of tiles, mm.
+    """
+    contents = {}
+    for place, low in corners.items():
+        on_tile = shapely().intersection(np.array(shapes), shapely().box(*low, *(low + size)))
+        if shapely().area(on_tile).max() > ROUNDING:
+            contents[place] = shapely().union_all(on_tile)
+    needed = set(contents)
+    # Those with the least on them are left out first.
+    for row, column in sorted(contents, key=lambda place: (round(contents[place].area, 3), place)):
+        neighbours = needed & {(row + i, column + j) for i in (-1, 0, 1) for j in (-1, 0, 1)}
+        shown = [
+            shapely().box(*(corners[place] + EDGE / 2), *(corners[place] + size - EDGE / 2))
+            for place in neighbours - {(row, column)}
+        ]
+        hidden = shapely().difference(contents[row, column], shapely().union_all(shown))
+        if hidden.area <= ROUNDING:
+            needed.remove((row, column))
+    return needed
+
+
+def crossings(shapes: Sequence[Polygon], tiles: Sequence[Tile]) -> int:
+    """Return the number of shapes that are on no single tile completely."""
     bounds = shapely().bounds(np.array(shapes))
     is_inside = np.zeros(len(bounds), dtype=bool)
     for tile in tiles:
         is_inside |= (bounds[:, :2] >= tile.low - ROUNDING).all(axis=1) & (
             bounds[:, 2:] <= tile.high + ROUNDING
         ).all(axis=1)
-    return bool(is_inside.all())
+    return int((~is_inside).sum())
