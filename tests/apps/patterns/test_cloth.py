@@ -10,9 +10,12 @@ import coneflat
 from coneflat import TriangleMesh
 from coneflat.apps.patterns.borders import find_borders, letters
 from coneflat.apps.patterns.cut_surface import CutSurface
+from coneflat.apps.patterns.equal_sides import with_equal_sides
+from coneflat.apps.patterns.least_strain import least_strain
+from coneflat.apps.patterns.power_sum import PowerSum
 from coneflat.apps.patterns.simplification import simplified
 from coneflat.apps.patterns.smooth_seams import with_smooth_seams
-from coneflat.apps.patterns.strain import FlatEdges, Stretch, _PowerSum, least_strain, with_equal_sides
+from coneflat.apps.patterns.strain import FlatEdges, Stretch
 from coneflat.apps.patterns.units import length_of
 from coneflat.errors import OptionError
 from coneflat.geometry import signed_double_areas, surface_distances
@@ -32,17 +35,36 @@ def cut_sphere(energy=4.05):
 
 def test_the_gradient_of_the_sum_of_powers_is_its_derivative():
     surface = cut_sphere()
-    edges, stretch = surface.edges, Stretch(0.05, 0.1)
-    model = _PowerSum(edges, surface.corners, stretch, 4)
+    stretch = Stretch(0.05, 0.1)
     rng = np.random.default_rng(0)
+    is_free = rng.random(len(surface.points)) < 0.8
+    total = PowerSum(surface.edges, surface.corners, stretch, is_free)
     points = surface.points + 1e-3 * rng.standard_normal(surface.points.shape)
-    bounds = stretch.bounds(edges.vectors(points))
-    gradient, hessian = model.derivatives(points, bounds)
-    direction = rng.standard_normal(points.shape)
+    bounds = stretch.bounds(surface.edges.vectors(points))
+    gradient, hessian = total.derivatives(points, bounds, 4)
+    direction = rng.standard_normal(points.shape) * is_free[:, None]
     step = 1e-6
-    values = [model.value(points + sign * step * direction, bounds) for sign in (1, -1)]
-    assert gradient @ direction.ravel() == pytest.approx((values[0] - values[1]) / (2 * step), rel=1e-5)
+    values = [total.value(points + sign * step * direction, bounds, 4) for sign in (1, -1)]
+    slope = gradient @ direction[is_free].ravel()
+    assert slope == pytest.approx((values[0] - values[1]) / (2 * step), rel=1e-5)
     assert abs(hessian - hessian.T).max() <= 1e-9 * abs(hessian).max()
+
+
+def test_the_hessian_of_the_sum_of_squares_is_its_second_derivative():
+    surface = cut_sphere()
+    stretch = Stretch(0.05, 0.05)
+    rng = np.random.default_rng(1)
+    is_free = rng.random(len(surface.points)) < 0.8
+    total = PowerSum(surface.edges, surface.corners, stretch, is_free)
+    # Where the strain is small, hardly anything of the Hessian is negative.
+    points = least_strain(surface.edges, surface.corners, surface.points, stretch)
+    bounds = stretch.bounds(surface.edges.vectors(points))
+    direction = rng.standard_normal(points.shape) * is_free[:, None]
+    step, moved = 1e-6, direction[is_free].ravel()
+    hessian = total.derivatives(points, bounds, 2)[1].copy()
+    slopes = [total.derivatives(points + sign * step * direction, bounds, 2)[0] @ moved for sign in (1, -1)]
+    curvature = (slopes[0] - slopes[1]) / (2 * step)
+    assert 0.9 * curvature <= moved @ hessian @ moved <= 1.1 * curvature
 
 
 def test_a_developable_surface_has_no_strain():
