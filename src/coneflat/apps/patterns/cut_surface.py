@@ -73,6 +73,11 @@ class CutSurface:
         rank[np.argsort(first)] = np.arange(len(first))
         return rank[inverse.reshape(-1)]
 
+    @property
+    def piece_count(self) -> int:
+        """The number of pieces."""
+        return int(self.pieces.max()) + 1
+
     @cached_property
     def piece_of_point(self) -> IntArray:
         """(u,) the piece of each point."""

@@ -118,8 +118,7 @@ class PowerSum:
     def _gradient(self, parts: tuple[FloatArray, ...]) -> FloatArray:
         size = self.pattern.matrix.shape[0]
         values = np.concatenate([part.ravel() for part in parts])
-        gradient: FloatArray = np.bincount(self.unknown, values, size + 1)[:size]
-        return gradient
+        return np.asarray(np.bincount(self.unknown, values, size + 1)[:size], dtype=np.float64)
 
     def _hessian(self, blocks: tuple[FloatArray, ...]) -> csc_matrix:
         matrix = self.pattern.matrix
