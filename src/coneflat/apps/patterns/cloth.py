@@ -23,16 +23,17 @@ from .nesting import grain_up
 from .options import PatternOptions
 from .relaxing import excess
 from .simplification import simplified
-from .slits import slit_until_within
+from .slits import Slitting, slit_until_within
 from .smooth_seams import with_smooth_seams
 from .strain import Stretch
 
 # The symmetric Dirichlet energy of an isometry.
 ISOMETRIC = 4.0
 # Energies above that of an isometry, relative to the squared strain that is allowed, of the textures that are tried.
-# Strains that are evenly distributed up to the bound in all directions give 8/3. More energy leaves more to slits. Of
-# 1, 2, 4 and 8 times 3, these gave the fewest pieces, or one or two more than the fewest, for eight patterns.
-ENERGIES_PER_STRAIN = (12.0, 6.0)
+# Strains that are evenly distributed up to the bound in all directions give 8/3. More energy leaves more to slits.
+ENERGIES_PER_STRAIN = (3.0, 6.0, 12.0, 24.0)
+# Fraction of edges beyond the bound above which the seams of a texture are so few that slits get longer than they were.
+MAX_STRAINED = 0.3
 # Fractions of the work that is left, for the progress, that one of them is, and smoothing.
 TEXTURE_SHARE, SMOOTHING_SHARE = 0.4, 0.7
 # Rounds in which darts are cut on to a border.
@@ -83,30 +84,26 @@ def cut_cloth(model: Model, stretch: Stretch, required: IntArray) -> CutSurface:
         stretch: what the material allows; if no cut was found within it, the largest strain is as small as was found.
         required: (k, 2) the vertices of edges that remain cut.
     """
-    surfaces = [
-        with_joined_pieces(slit_until_within(start, stretch), stretch, required)
-        for start in _textures(model, stretch)
-    ]
+    surfaces = list[CutSurface]()
+    for number, energy in enumerate(ENERGIES_PER_STRAIN):
+        with part_of_work(TEXTURE_SHARE, f"attempt {number + 1}"):
+            texture = _texture(model, ISOMETRIC + energy * (stretch.warp**2 + stretch.weft**2) / 2)
+            slitting = Slitting.of(texture, stretch)
+            if surfaces and slitting.strained_share > MAX_STRAINED:
+                break
+            surfaces.append(with_joined_pieces(slitting.until_within(), stretch, required))
+        if not len(texture.seams):
+            break
     return min(
         surfaces,
         key=lambda surface: (excess(surface, stretch).max(), surface.piece_count, surface.seam_length),
     )
 
 
-def _textures(model: Model, stretch: Stretch) -> Iterator[CutSurface]:
-    """Yield textures of a model with different seams."""
+def _texture(model: Model, max_energy: float) -> CutSurface:
     mesh = model.mesh
-    seams = list[IntArray]()
-    for number, energy in enumerate(ENERGIES_PER_STRAIN):
-        max_energy = ISOMETRIC + energy * (stretch.warp**2 + stretch.weft**2) / 2
-        with part_of_work(TEXTURE_SHARE, f"attempt {number + 1}"):
-            texture = unwrap(
-                mesh.vertices, mesh.faces, max_energy=max_energy, packing_cuts=0.0, seams=model.seams
-            )
-            surface = grain_up(CutSurface.of(texture), model.axis)
-            if not any(np.array_equal(surface.seams, cut) for cut in seams):
-                yield surface
-        seams.append(surface.seams)
+    texture = unwrap(mesh.vertices, mesh.faces, max_energy=max_energy, packing_cuts=0.0, seams=model.seams)
+    return grain_up(CutSurface.of(texture), model.axis)
 
 
 def without_darts(surface: CutSurface, stretch: Stretch) -> CutSurface:

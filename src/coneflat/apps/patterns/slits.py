@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,61 +18,85 @@ from .strain import Stretch
 
 # Rings of triangles around new cuts whose points move.
 RINGS = 16
-# Rounds of slits. Each cuts at least one edge more.
-ROUNDS = 100
 # Vertices at the tips of slits of the same round are more edges than this apart.
-TIP_DISTANCE = 8
+TIP_DISTANCE = 16
 
 
-def slit_until_within(surface: CutSurface, stretch: Stretch, max_strained: float = 1.0) -> CutSurface:
-    """Return a cut surface with slits from its seams, until its strain is within the bound, or no slit helps.
+def slit_until_within(surface: CutSurface, stretch: Stretch) -> CutSurface:
+    """Return a cut surface with slits from its seams, until its strain is within the bound and nothing overlaps."""
+    return Slitting.of(surface, stretch).until_within()
+
+
+@dataclass(frozen=True, eq=False)
+class Slitting:
+    """A cut surface that gets slits.
 
     Slits end where the strain is concentrated if it is only moderately even: the more even it is, the more edges have
     the largest one.
 
-    Args:
-        surface: the surface.
-        stretch: what the material allows.
-        max_strained: fraction of edges beyond the bound above which no slits are cut.
-    """
-    even = relaxed(surface, stretch, EVEN)
-    flat = relaxed(even, stretch, SMALLEST)
-    for _ in range(ROUNDS):
-        begin_step()
-        beyond = excess(flat, stretch)
-        if not beyond.any():
-            separated = without_overlaps(flat)
-            if separated is not flat:
-                even = even.cut_along(separated.seams, separated.places)
-                even, flat = _relaxed_near(even, even, np.setdiff1d(separated.seams, flat.seams), stretch)
-                continue
-            beyond = excess(closed_seams(flat), stretch)
-        if not beyond.any() or (beyond > 0).mean() > max_strained:
-            break
-        slits = _slits(even, excess(even, stretch), beyond > 0)
-        if not len(slits):
-            break
-        seams = np.union1d(even.seams, slits)
-        even, flat = _relaxed_near(even.cut_along(seams), flat.cut_along(seams), slits, stretch)
-    return closed_seams(flat)
-
-
-def _relaxed_near(
-    even: CutSurface, flat: CutSurface, cuts: IntArray, stretch: Stretch
-) -> tuple[CutSurface, CutSurface]:
-    """Return both layouts of a surface relaxed around new cuts (k,), the second from the first one there.
-
-    Args:
+    Attributes:
         even: the layout in which strain is moderately even.
         flat: the layout with the smallest largest strain.
-        cuts: edges of the mesh.
         stretch: what the material allows.
     """
-    is_cut = mask_of(len(even.mesh.vertices), even.mesh.edges[cuts])
-    is_free = nearby(even.corners, has_any(is_cut, even.mesh.faces), RINGS)
-    even = relaxed(even, stretch, EVEN[-1:], is_free)
-    start = replace(flat, points=np.where(is_free[:, None], even.points, flat.points))
-    return even, relaxed(start, stretch, SMALLEST, is_free)
+
+    even: CutSurface
+    flat: CutSurface
+    stretch: Stretch
+
+    @classmethod
+    def of(cls, surface: CutSurface, stretch: Stretch) -> Slitting:
+        """Return the layouts of a surface without slits."""
+        even = relaxed(surface, stretch, EVEN)
+        return cls(even, relaxed(even, stretch, SMALLEST), stretch)
+
+    @property
+    def strained_share(self) -> float:
+        """The fraction of edges that are strained beyond the bound."""
+        return float((excess(self.flat, self.stretch) > 0).mean())
+
+    def until_within(self) -> CutSurface:
+        """Return the surface with slits until its strain is within the bound, and nothing overlaps.
+
+        Every round cuts more edges. The strain remains beyond the bound only if triangles that are cut apart could not
+        be laid out.
+        """
+        slitting, seam_count = self, -1
+        while len(slitting.flat.seams) > seam_count:
+            begin_step()
+            seam_count = len(slitting.flat.seams)
+            surface = slitting.flat
+            beyond = excess(surface, self.stretch)
+            if not beyond.any():
+                separated = without_overlaps(surface)
+                if separated is not surface:
+                    slitting = slitting._separated(separated)
+                    continue
+                surface = closed_seams(surface)
+                beyond = excess(surface, self.stretch)
+                if not beyond.any():
+                    return surface
+            slitting = slitting._with_slits(beyond > 0)
+        return closed_seams(slitting.flat)
+
+    def _with_slits(self, remains: BoolArray) -> Slitting:
+        """Return the surface with slits to regions of flat edges whose strain remains too large, (k,) True."""
+        slits = _slits(self.even, excess(self.even, self.stretch), remains)
+        seams = np.union1d(self.even.seams, slits)
+        return self._relaxed_near(self.even.cut_along(seams), self.flat.cut_along(seams), slits)
+
+    def _separated(self, separated: CutSurface) -> Slitting:
+        """Return the layouts of the surface with the seams that separate its overlaps."""
+        even = self.even.cut_along(separated.seams, separated.places)
+        return self._relaxed_near(even, even, np.setdiff1d(separated.seams, self.flat.seams))
+
+    def _relaxed_near(self, even: CutSurface, flat: CutSurface, cuts: IntArray) -> Slitting:
+        """Return layouts relaxed around new cuts (k,), edges of the mesh; the second from the first one there."""
+        is_cut = mask_of(len(even.mesh.vertices), even.mesh.edges[cuts])
+        is_free = nearby(even.corners, has_any(is_cut, even.mesh.faces), RINGS)
+        even = relaxed(even, self.stretch, EVEN[-1:], is_free)
+        start = replace(flat, points=np.where(is_free[:, None], even.points, flat.points))
+        return Slitting(even, relaxed(start, self.stretch, SMALLEST, is_free), self.stretch)
 
 
 def _slits(surface: CutSurface, beyond: FloatArray, remains: BoolArray) -> IntArray:
