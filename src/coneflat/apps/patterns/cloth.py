@@ -56,6 +56,8 @@ def cloth_pieces(model: Model, options: PatternOptions) -> Development:
     surface = cut_cloth(replace(model, mesh=mesh), stretch, required)
     with part_of_work(SMOOTHING_SHARE, "smooth seams"):
         smooth = slit_until_within(with_smooth_seams(surface, options.tolerance, model.seams), stretch)
+        if smooth.piece_count > surface.piece_count:
+            smooth = with_joined_pieces(smooth, stretch, required)
     if not excess(smooth, stretch).any() or excess(surface, stretch).any():
         surface = smooth
     if options.darts == "none":

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
-from ...base import BoolArray, FloatArray, IntArray, begin_step, mask_of
+from ...base import BoolArray, FloatArray, IntArray, begin_step, has_any, mask_of
 from ...geometry import signed_double_areas
 from ...mesh import are_among, nearby
 from .borders import Seam, find_borders
@@ -20,8 +22,26 @@ WORK = 24.0
 HOPELESS = 1.0
 
 
+class _Joint(NamedTuple):
+    """A seam that may be closed: one between two pieces, or a dart.
+
+    Attributes:
+        seam: the seam.
+        edges: (k,) the edges of the mesh on it.
+        moved: the piece that is moved to the other one; None for darts.
+        key: the first edge, the number of edges, and the sizes of the two pieces: it changes if one of them does.
+        rank: joints with a smaller one are tried first.
+    """
+
+    seam: Seam
+    edges: IntArray
+    moved: int | None
+    key: tuple[int, ...]
+    rank: tuple[float, ...]
+
+
 def with_joined_pieces(surface: CutSurface, stretch: Stretch, required: IntArray) -> CutSurface:
-    """Return a cut surface with as many pieces joined as possible without overlaps.
+    """Return a cut surface with as many pieces joined, and then darts closed, as possible without overlaps.
 
     No edge is strained more than allowed that was not before.
 
@@ -34,52 +54,57 @@ def with_joined_pieces(surface: CutSurface, stretch: Stretch, required: IntArray
     is_required = are_among(surface.mesh.edges, required)
     points_left = WORK * len(surface.points)
     failures = set[tuple[int, ...]]()
-    candidates = _candidates(surface, is_required, failures)
-    while candidates and points_left > 0:
+    joints = _joints(surface, is_required, failures)
+    while joints and points_left > 0:
         begin_step()
-        key, piece, seam = candidates.pop()
-        sewn = _sewn(surface, piece, seam)
-        is_free = nearby(sewn.corners, surface.pieces == piece, RINGS)
+        joint = joints.pop(0)
+        sewn, is_free = _sewn(surface, joint)
         points_left -= int(is_free.sum())
         joined = _within(sewn, is_free, stretch, allowed)
         if joined is None:
-            failures.add(key)
+            failures.add(joint.key)
         else:
             surface = joined
-            candidates = _candidates(surface, is_required, failures)
+            joints = _joints(surface, is_required, failures)
     return surface
 
 
-def _candidates(
-    surface: CutSurface, is_required: BoolArray, failures: set[tuple[int, ...]]
-) -> list[tuple[tuple[int, ...], int, Seam]]:
-    """Return the seams between two pieces that may be closed, with a key, and the smaller piece.
+def _joints(surface: CutSurface, is_required: BoolArray, failures: set[tuple[int, ...]]) -> list[_Joint]:
+    """Return the seams that may be closed, except those that failed, in the order in which they are tried.
 
-    The smallest piece is the last one, with its longest seam. The key is the seam's first edge, the number of its edges
-    and the sizes of the two pieces: they change if one of the pieces does. Keys among `failures` are left out.
+    These are seams of the smallest pieces, the longest first, and then darts, the shortest first.
     """
     areas = np.bincount(surface.pieces, surface.edges.double_areas)
     sizes = np.bincount(surface.pieces)
-    candidates = []
+    joints = []
     for seam in find_borders(surface).seams:
         first, second = (side.piece for side in seam.sides)
         edges = surface.mesh.halfedge_edges[seam.sides[0].halfedges]
         key = int(edges.min()), len(edges), *sorted((int(sizes[first]), int(sizes[second])))
-        if first != second and key not in failures and not is_required[edges].any():
-            candidates.append((key, min(first, second, key=lambda piece: areas[piece]), seam))
-    return sorted(candidates, key=lambda item: (-areas[item[1]], item[2].surface_length))
+        if key in failures or is_required[edges].any():
+            continue
+        if first != second:
+            moved = min(first, second, key=lambda piece: areas[piece])
+            joints.append(_Joint(seam, edges, moved, key, (0.0, areas[moved], -seam.surface_length)))
+        elif seam.is_dart:
+            joints.append(_Joint(seam, edges, None, key, (1.0, seam.surface_length)))
+    return sorted(joints, key=lambda joint: joint.rank)
 
 
-def _sewn(surface: CutSurface, piece: int, seam: Seam) -> CutSurface:
-    """Return a surface with a piece moved to another one and joined to it along a seam."""
-    moved, fixed = seam.sides if seam.sides[0].piece == piece else seam.sides[::-1]
-    is_member = surface.pieces == piece
-    places = surface.places.copy()
-    places[is_member] = _moved_onto(
-        surface.points[moved.points], surface.points[fixed.points[::-1]], places[is_member]
-    )
-    is_closed = mask_of(len(surface.mesh.edges), surface.mesh.halfedge_edges[moved.halfedges])
-    return surface.cut_along(surface.seams[~is_closed[surface.seams]], places)
+def _sewn(surface: CutSurface, joint: _Joint) -> tuple[CutSurface, BoolArray]:
+    """Return a surface with a seam closed, whose piece was moved to the other one, and the points to move then."""
+    places, mesh = surface.places.copy(), surface.mesh
+    is_around = has_any(mask_of(len(mesh.vertices), mesh.edges[joint.edges]), mesh.faces)
+    if joint.moved is not None:
+        moved, fixed = (
+            joint.seam.sides if joint.seam.sides[0].piece == joint.moved else joint.seam.sides[::-1]
+        )
+        is_around = surface.pieces == joint.moved
+        places[is_around] = _moved_onto(
+            surface.points[moved.points], surface.points[fixed.points[::-1]], places[is_around]
+        )
+    sewn = surface.cut_along(np.setdiff1d(surface.seams, joint.edges), places)
+    return sewn, nearby(sewn.corners, is_around, RINGS)
 
 
 def _within(surface: CutSurface, is_free: BoolArray, stretch: Stretch, allowed: float) -> CutSurface | None:
