@@ -30,7 +30,7 @@ class DrawnLine:
 
 def dxf_lines(path: Path) -> list[DrawnLine]:
     """Return the polylines of a DXF file."""
-    lines = path.read_text(encoding="utf-8").splitlines()
+    lines = path.read_text(encoding="cp1252").splitlines()
     groups = [(int(code), value.strip()) for code, value in zip(lines[::2], lines[1::2], strict=True)]
     starts = [i for i, (code, _) in enumerate(groups) if code == ENTITY]
     entities = (groups[start:end] for start, end in pairwise([*starts, len(groups)]))
