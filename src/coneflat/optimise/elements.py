@@ -148,9 +148,9 @@ class Elements:
         return len(self.unknowns)
 
     @cached_property
-    def pattern(self) -> Pattern:
+    def pattern(self) -> ElementPattern:
         """The entries of the Hessian."""
-        return Pattern.of(self.start, self.unknown, self.count)
+        return ElementPattern.of(self.start, self.unknown, self.count)
 
     @cached_property
     def _labels(self) -> tuple[int, IntArray]:
@@ -238,7 +238,7 @@ class Elements:
 
 
 @dataclass(frozen=True, eq=False)
-class Pattern:
+class ElementPattern:
     """The entries of the Hessian.
 
     Attributes:
@@ -254,7 +254,7 @@ class Pattern:
     diagonal: IntArray
 
     @classmethod
-    def of(cls, start: IntArray, unknown: IntArray, count: int) -> Pattern:
+    def of(cls, start: IntArray, unknown: IntArray, count: int) -> ElementPattern:
         """Return the entries for elements with `start` and `unknown` as of `Elements`, and a number of unknowns."""
         sizes = np.diff(start)
         squares = np.concatenate([[0], np.cumsum(sizes**2)])

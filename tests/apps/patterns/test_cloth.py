@@ -10,12 +10,19 @@ import coneflat
 from coneflat import TriangleMesh
 from coneflat.apps.patterns.borders import find_borders, letters
 from coneflat.apps.patterns.cut_surface import CutSurface
+from coneflat.apps.patterns.equal_sides import with_equal_sides
+from coneflat.apps.patterns.joining import with_joined_pieces
+from coneflat.apps.patterns.least_strain import least_strain
+from coneflat.apps.patterns.power_sum import PowerSum
+from coneflat.apps.patterns.relaxing import excess
 from coneflat.apps.patterns.simplification import simplified
+from coneflat.apps.patterns.slits import slit_until_within
 from coneflat.apps.patterns.smooth_seams import with_smooth_seams
-from coneflat.apps.patterns.strain import FlatEdges, Stretch, _PowerSum, least_strain, with_equal_sides
+from coneflat.apps.patterns.strain import FlatEdges, Stretch
 from coneflat.apps.patterns.units import length_of
 from coneflat.errors import OptionError
 from coneflat.geometry import signed_double_areas, surface_distances
+from coneflat.mesh import open_along
 
 
 @pytest.fixture(scope="module")
@@ -32,17 +39,36 @@ def cut_sphere(energy=4.05):
 
 def test_the_gradient_of_the_sum_of_powers_is_its_derivative():
     surface = cut_sphere()
-    edges, stretch = surface.edges, Stretch(0.05, 0.1)
-    model = _PowerSum(edges, surface.corners, stretch, 4)
+    stretch = Stretch(0.05, 0.1)
     rng = np.random.default_rng(0)
+    is_free = rng.random(len(surface.points)) < 0.8
+    total = PowerSum(surface.edges, surface.corners, stretch, is_free)
     points = surface.points + 1e-3 * rng.standard_normal(surface.points.shape)
-    bounds = stretch.bounds(edges.vectors(points))
-    gradient, hessian = model.derivatives(points, bounds)
-    direction = rng.standard_normal(points.shape)
+    bounds = stretch.bounds(surface.edges.vectors(points))
+    gradient, hessian = total.derivatives(points, bounds, 4)
+    direction = rng.standard_normal(points.shape) * is_free[:, None]
     step = 1e-6
-    values = [model.value(points + sign * step * direction, bounds) for sign in (1, -1)]
-    assert gradient @ direction.ravel() == pytest.approx((values[0] - values[1]) / (2 * step), rel=1e-5)
+    values = [total.value(points + sign * step * direction, bounds, 4) for sign in (1, -1)]
+    slope = gradient @ direction[is_free].ravel()
+    assert slope == pytest.approx((values[0] - values[1]) / (2 * step), rel=1e-5)
     assert abs(hessian - hessian.T).max() <= 1e-9 * abs(hessian).max()
+
+
+def test_the_hessian_of_the_sum_of_squares_is_its_second_derivative():
+    surface = cut_sphere()
+    stretch = Stretch(0.05, 0.05)
+    rng = np.random.default_rng(1)
+    is_free = rng.random(len(surface.points)) < 0.8
+    total = PowerSum(surface.edges, surface.corners, stretch, is_free)
+    # Where the strain is small, hardly anything of the Hessian is negative.
+    points = least_strain(surface.edges, surface.corners, surface.points, stretch)
+    bounds = stretch.bounds(surface.edges.vectors(points))
+    direction = rng.standard_normal(points.shape) * is_free[:, None]
+    step, moved = 1e-6, direction[is_free].ravel()
+    hessian = total.derivatives(points, bounds, 2)[1].copy()
+    slopes = [total.derivatives(points + sign * step * direction, bounds, 2)[0] @ moved for sign in (1, -1)]
+    curvature = (slopes[0] - slopes[1]) / (2 * step)
+    assert 0.9 * curvature <= moved @ hessian @ moved <= 1.1 * curvature
 
 
 def test_a_developable_surface_has_no_strain():
@@ -114,6 +140,30 @@ def test_less_strain_needs_longer_seams(ball):
     assert tighter.surface.seam_length > result.surface.seam_length
 
 
+@pytest.mark.parametrize("strain", [0.01, 0.003])
+def test_small_bounds_are_met(strain):
+    rng = np.random.default_rng(2)
+    vertices, faces = shapes.sphere(2)
+    vertices = vertices * (1 + 0.1 * rng.standard_normal((len(vertices), 1)))
+    result = coneflat.pattern(vertices, faces, height=100, strain=strain, page="none")
+    assert np.abs(result.strains).max() <= strain
+    assert not len(result.surface.overlaps())
+
+
+def test_pieces_are_joined_and_darts_closed_within_the_bound():
+    stretch = Stretch(0.1, 0.1)
+    surface = slit_until_within(cut_sphere(), Stretch(0.02, 0.02))
+    apart = surface.cut_along(np.union1d(surface.seams, surface.mesh.halfedge_edges[:60]))
+    joined = with_joined_pieces(apart, stretch, np.empty((0, 2), dtype=np.int64))
+    assert apart.piece_count > surface.piece_count
+    assert joined.piece_count == 1
+    assert joined.seam_length < surface.seam_length
+    assert not excess(joined, stretch).any()
+    assert not len(joined.overlaps())
+    required = apart.mesh.edges[apart.seams]
+    assert np.array_equal(with_joined_pieces(apart, stretch, required).seams, apart.seams)
+
+
 def test_strain_may_differ_along_the_grain(ball):
     (vertices, faces), _ = ball
     stretch = {"stretch_warp": "4%", "stretch_weft": "20%"}
@@ -154,6 +204,22 @@ def test_smooth_seams_stay_near_the_surface():
     assert surface_distances(after.vertices, after.faces, before.vertices).max() <= tolerance
     assert smooth.seam_length < surface.seam_length
     assert with_smooth_seams(surface, 0.0) is surface
+
+
+def test_seams_on_creases_stay_there():
+    angle = np.linspace(0, 2 * np.pi, 24, endpoint=False)
+    rim = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    rings = [
+        np.pad(radius * rim, ((0, 0), (0, 1)), constant_values=z) for radius, z in ((0.5, 1), (1, 1), (1, 0))
+    ]
+    i, j = np.arange(24), np.roll(np.arange(24), -1)
+    faces = [np.stack([i + a, i + a + 24, j + a + 24], axis=1) for a in (0, 24)]
+    faces += [np.stack([i + a, j + a + 24, j + a], axis=1) for a in (0, 24)]
+    mesh = TriangleMesh(np.concatenate(rings), np.concatenate(faces))
+    cut = open_along(mesh, np.flatnonzero(((mesh.edges >= 24) & (mesh.edges < 48)).all(axis=1)))
+    surface = CutSurface(mesh, cut.mesh.faces, np.zeros((len(cut.mesh.vertices), 2)))
+    assert len(surface.seams) == 24
+    assert np.array_equal(with_smooth_seams(surface, 0.05).mesh.vertices, mesh.vertices)
 
 
 def test_dense_meshes_are_simplified_within_the_tolerance():

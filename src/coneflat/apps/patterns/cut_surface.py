@@ -78,6 +78,11 @@ class CutSurface:
         rank[order_by_size(areas, centres)] = np.arange(len(areas))
         return rank[label]
 
+    @property
+    def piece_count(self) -> int:
+        """The number of pieces."""
+        return int(self.pieces.max()) + 1
+
     @cached_property
     def piece_of_point(self) -> IntArray:
         """(u,) the piece of each point."""

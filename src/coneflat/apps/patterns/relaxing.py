@@ -11,7 +11,9 @@ import numpy as np
 from ...base import BoolArray, FloatArray
 from ...errors import MetricError
 from .cut_surface import CutSurface
-from .strain import EXPONENTS, Stretch, least_strain, relative_strains, with_equal_sides
+from .equal_sides import with_equal_sides
+from .least_strain import EXPONENTS, least_strain
+from .strain import Stretch, relative_strains
 
 #: Exponents of the strain: of layouts in which it is moderately even, and then for the smallest largest one.
 EVEN, SMALLEST = (2, 4), (8, 16, 32)

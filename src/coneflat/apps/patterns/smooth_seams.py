@@ -8,13 +8,15 @@ import numpy as np
 from scipy.sparse import csr_matrix
 
 from ...base import BoolArray, FloatArray, IntArray
-from ...geometry import TriangleTree
+from ...geometry import TriangleTree, dihedral_angles
 from .cut_surface import CutSurface
 
 # Rounds in which every vertex moves half of the way to the middle between its neighbours on the seam.
 ROUNDS = 20
 # Times that vertices go back half of the way where the surface is too far away, then all of it, with those around.
 HALVINGS = 16
+# Angle between the normals of two triangles from which on their edge is a crease, radians.
+CREASE = np.pi / 4
 # Smallest area of a triangle whose corners moved, relative to the area it had.
 MIN_AREA = 0.2
 # Smallest cosine of the angle between the normals of a triangle before and after.
@@ -22,7 +24,7 @@ MIN_COSINE = 0.8
 
 
 def with_smooth_seams(surface: CutSurface, tolerance: float, required: IntArray | None = None) -> CutSurface:
-    """Return a cut surface whose seams are smoother; ends, forks, the border and required seams stay.
+    """Return a cut surface whose seams are smoother; ends, forks, creases, the border and required seams stay.
 
     The vertices of seams slide along the surface, so the two sides of a seam remain equal. Triangles keep their places
     in the plane, and must be laid out again.
@@ -38,6 +40,7 @@ def with_smooth_seams(surface: CutSurface, tolerance: float, required: IntArray 
     is_border = mesh.is_boundary_vertex
     degree = np.bincount(along.ravel(), minlength=len(mesh.vertices))
     is_movable = (degree == 2) & ~is_border
+    is_movable[along[np.abs(dihedral_angles(mesh)[surface.seams]) > CREASE]] = False
     if required is not None:
         is_movable[required] = False
     if tolerance == 0 or not is_movable.any():
