@@ -6,7 +6,9 @@ from typing import TYPE_CHECKING, Any
 #: Where names are defined; they are imported when they are first used, since commands need the options alone.
 _HOMES = {
     "Domains": "domains",
+    "Half": "mirrored",
     "IntegerGrid": "integer_map",
+    "MirrorPlane": "mirror_planes",
     "QUADS": "options",
     "QUAD_MEASURES": "quality",
     "QuadMeasures": "quality",
@@ -15,8 +17,10 @@ _HOMES = {
     "Sizes": "options",
     "check_grid_output": "files",
     "check_quads_output": "files",
+    "doubled": "mirrored",
     "extract_quads": "extract",
     "find_domains": "domains",
+    "half_of": "mirrored",
     "holds_quads": "files",
     "integer_grid": "quad_meshing",
     "measure_quads": "quality",
@@ -31,15 +35,19 @@ __all__ = [
     "QUADS",
     "QUAD_MEASURES",
     "Domains",
+    "Half",
     "IntegerGrid",
+    "MirrorPlane",
     "QuadMeasures",
     "QuadMesh",
     "QuadOptions",
     "Sizes",
     "check_grid_output",
     "check_quads_output",
+    "doubled",
     "extract_quads",
     "find_domains",
+    "half_of",
     "holds_quads",
     "integer_grid",
     "measure_quads",
@@ -63,6 +71,8 @@ if TYPE_CHECKING:
         write_quads_stream,
     )
     from .integer_map import IntegerGrid
+    from .mirror_planes import MirrorPlane
+    from .mirrored import Half, doubled, half_of
     from .options import QUADS, QuadOptions, Sizes
     from .quad_mesh import QuadMesh
     from .quad_meshing import integer_grid, quads

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import shapes
+from scipy.spatial import cKDTree
 
 import coneflat
 from coneflat import TriangleMesh
@@ -181,6 +182,38 @@ def test_without_darts_no_cut_ends_inside_a_piece(ball):
     dartless = coneflat.pattern(vertices, faces, height=100, strain=0.08, darts="none", page="none")
     assert not len(dartless.darts)
     assert np.abs(dartless.strains).max() <= 0.08
+
+
+def lopsided_ball():
+    """A ball of 320 triangles whose only plane of symmetry is across x."""
+    x, y, z = shapes.sphere(2, bumps=0)[0].T
+    radius = 1 + 0.3 * y + 0.2 * z + 0.2 * y * z + 0.5 * x**2 * z
+    return np.stack([x, y, z], axis=1) * radius[:, None], shapes.sphere(2, bumps=0)[1]
+
+
+def middles_of_seams(result):
+    surface = result.surface
+    return surface.mesh.vertices[surface.mesh.edges[surface.seams]].mean(axis=1)
+
+
+def test_symmetric_surfaces_have_symmetric_seams():
+    options = {"height": 100, "axis": (0, 0, 1), "page": "none"}
+    middles = middles_of_seams(coneflat.pattern(*lopsided_ball(), strain=0.05, **options))
+    centre = (middles[:, 0].min() + middles[:, 0].max()) / 2
+    gaps = cKDTree(middles).query((middles - [2 * centre, 0, 0]) * [-1, 1, 1])[0]
+    assert gaps.max() < 1e-6
+    assert np.abs(middles[:, 0] - centre).max() > 10
+    without = middles_of_seams(coneflat.pattern(*lopsided_ball(), strain=0.05, symmetry="none", **options))
+    centre = (without[:, 0].min() + without[:, 0].max()) / 2
+    assert cKDTree(without).query((without - [2 * centre, 0, 0]) * [-1, 1, 1])[0].max() > 1
+
+
+def test_a_grain_across_the_plane_allows_no_mirror_images():
+    across = coneflat.pattern(*lopsided_ball(), height=100, strain=0.05, grain=(1, 0, 0), page="none")
+    plain = coneflat.pattern(
+        *lopsided_ball(), height=100, strain=0.05, grain=(1, 0, 0), symmetry="none", page="none"
+    )
+    assert np.array_equal(across.surface.seams, plain.surface.seams)
 
 
 def test_named_edges_are_seams(ball):

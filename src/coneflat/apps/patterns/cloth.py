@@ -18,6 +18,7 @@ from .borders import find_borders
 from .cut_surface import CutSurface
 from .development import Development
 from .joining import with_joined_pieces
+from .mirrored import half_of_model, joined_across, with_images
 from .model import Model
 from .nesting import grain_up
 from .options import PatternOptions
@@ -36,6 +37,8 @@ ENERGIES_PER_STRAIN = (3.0, 6.0, 12.0, 24.0)
 MAX_STRAINED = 0.3
 # Fractions of the work that is left, for the progress, that one of them is, and smoothing.
 TEXTURE_SHARE, SMOOTHING_SHARE = 0.4, 0.7
+# The same for the half of a symmetric model.
+HALF_SHARE = 0.8
 # Rounds in which darts are cut on to a border.
 ROUNDS = 16
 
@@ -44,25 +47,45 @@ def cloth_pieces(model: Model, options: PatternOptions) -> Development:
     """Return a model cut into pieces of cloth with the grain upward, and notes on bounds that were not met."""
     warp, weft = options.stretch_warp or options.strain, options.stretch_weft or options.strain
     stretch = Stretch(warp, weft)
-    mesh, notes = model.mesh, list[str]()
+    pieces = _symmetric_pieces(model, stretch, options.tolerance) if options.symmetry == "auto" else None
+    if pieces is None:
+        pieces = _smooth_pieces(model, stretch, options.tolerance)
+    surface = pieces.surface
+    if options.darts == "none":
+        surface = without_darts(surface, stretch)
+    return Development(surface, notes=(*pieces.notes, *map(Unmet, _unmet(surface, stretch, options))))
+
+
+def _symmetric_pieces(model: Model, stretch: Stretch, tolerance: float) -> Development | None:
+    """Return a symmetric model cut into symmetric pieces; None if it is not symmetric, or they are beyond the bound."""
+    half = half_of_model(model)
+    if half is None:
+        return None
+    with part_of_work(HALF_SHARE):
+        pieces = _smooth_pieces(half.model, stretch, tolerance)
+    surface = joined_across(with_images(pieces.surface, half.plane), half.plane, stretch)
+    return None if excess(surface, stretch).any() else replace(pieces, surface=surface)
+
+
+def _smooth_pieces(model: Model, stretch: Stretch, tolerance: float) -> Development:
+    """Return a model, simplified if it is dense, cut into pieces along smooth seams."""
+    mesh, notes = model.mesh, tuple[str, ...]()
     if model.seams is None:
-        mesh, distances = simplified(model.mesh, options.tolerance)
+        mesh, distances = simplified(model.mesh, tolerance)
         if mesh is not model.mesh:
-            notes.append(
+            notes = (
                 f"The pattern is that of a mesh with {len(mesh.faces):,} instead of {len(model.mesh.faces):,} "
-                f"triangles, {distances.mean():.2g} mm from it on average and {distances.max():.2g} mm at most."
+                f"triangles, {distances.mean():.2g} mm from it on average and {distances.max():.2g} mm at most.",
             )
     required = np.empty((0, 2), dtype=np.int64) if model.seams is None else model.seams
     surface = cut_cloth(replace(model, mesh=mesh), stretch, required)
     with part_of_work(SMOOTHING_SHARE, "smooth seams"):
-        smooth = slit_until_within(with_smooth_seams(surface, options.tolerance, model.seams), stretch)
+        smooth = slit_until_within(with_smooth_seams(surface, tolerance, model.seams), stretch)
         if smooth.piece_count > surface.piece_count:
             smooth = with_joined_pieces(smooth, stretch, required)
     if not excess(smooth, stretch).any() or excess(surface, stretch).any():
         surface = smooth
-    if options.darts == "none":
-        surface = without_darts(surface, stretch)
-    return Development(surface, notes=(*notes, *map(Unmet, _unmet(surface, stretch, options))))
+    return Development(surface, notes=notes)
 
 
 def _unmet(surface: CutSurface, stretch: Stretch, options: PatternOptions) -> Iterator[str]:

@@ -19,7 +19,7 @@ KINDS = ("cloth", "net", "gores", "sheet")
 MAX_GORES = 200
 #: Options that not all kinds have.
 OWN_OPTIONS = {
-    "cloth": ("strain", "stretch_warp", "stretch_weft", "darts", "seams", "tolerance", "grain"),
+    "cloth": ("strain", "stretch_warp", "stretch_weft", "darts", "symmetry", "seams", "tolerance", "grain"),
     "net": ("tabs",),
     "gores": ("gores", "grain"),
 }
@@ -39,6 +39,7 @@ class PatternOptions(RunOptions):
         stretch_warp: The same along the grain only, for cloth that stretches differently.
         stretch_weft: The same across the grain only.
         darts: auto: cuts that end inside a piece become darts. none: they go on to another border.
+        symmetry: auto: cloth of a surface with a plane of symmetry is symmetric, too. none: it need not be.
         seams: Edges that must be cut, as pairs of vertices; or input, for the seams of the UVs in the file.
         tolerance: Largest distance from the surface at which seams of cloth are made smooth, and mean distance at which
             dense meshes are simplified; 0 for neither.
@@ -63,6 +64,7 @@ class PatternOptions(RunOptions):
     stretch_warp: float | None = option(None, Percentage(optional=True))
     stretch_weft: float | None = option(None, Percentage(optional=True))
     darts: str = option("auto", Choice(("auto", "none")))
+    symmetry: str = option("auto", Choice(("auto", "none")))
     seams: ArrayLike | str | None = option(None, Edges(("input",)), one_mesh=True)
     tolerance: float = option(0.5, Length())
     gores: int = option(12, Number(2, MAX_GORES, is_integer=True))
