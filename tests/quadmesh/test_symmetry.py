@@ -17,7 +17,7 @@ from coneflat.errors import OptionError
 from coneflat.mesh.connectivity import TriangleMesh
 from coneflat.quadmesh.extract import extract_quads
 from coneflat.quadmesh.mirror_choice import fault, fault_of_angles, on_given_surface
-from coneflat.quadmesh.mirror_planes import MirrorPlane, mirror_planes
+from coneflat.quadmesh.mirror_planes import MirrorPlane, symmetry_planes
 from coneflat.quadmesh.mirrored import half_of
 from coneflat.quadmesh.remesh import area_of
 from coneflat.quadmesh.request import GridRequest
@@ -104,7 +104,7 @@ def motion(seed):
 def test_spot_is_symmetric(tmp_path, count):
     vertices, faces = spot(tmp_path)
     mesh = coneflat.quads(vertices, faces, quads=count)
-    (plane,) = mirror_planes(TriangleMesh(vertices, faces))
+    (plane,) = symmetry_planes(TriangleMesh(vertices, faces))
     assert str(plane) == "the plane across (1, 0, 0) at 0"
     check_symmetric(mesh, plane)
     assert 0.8 < len(mesh.quads) / count < 1.5
@@ -123,9 +123,9 @@ def test_a_moved_and_renumbered_surface():
     order = np.random.default_rng(2).permutation(len(vertices))
     number = np.argsort(order)
     first = coneflat.quads(vertices, faces, quads=600)
-    check_symmetric(first, next(mirror_planes(TriangleMesh(vertices, faces))))
+    check_symmetric(first, next(symmetry_planes(TriangleMesh(vertices, faces))))
     moved = 100 * (vertices @ turn.T + shift)
-    (plane,) = mirror_planes(TriangleMesh(moved[order], number[faces]))
+    (plane,) = symmetry_planes(TriangleMesh(moved[order], number[faces]))
     second = coneflat.quads(moved[order], number[faces], quads=600)
     check_symmetric(second, plane)
     assert len(first.quads) == len(second.quads)
@@ -137,7 +137,7 @@ def test_a_moved_and_renumbered_surface():
 def test_mechanical_shapes_whose_triangles_are_not_symmetric(name):
     vertices, faces = mechanical.SHAPES[name]()
     mesh = coneflat.quads(vertices, faces, quads=1500)
-    planes = list(mirror_planes(check_mesh(vertices, faces).mesh))
+    planes = list(symmetry_planes(check_mesh(vertices, faces).mesh))
     check_symmetric(mesh, planes[0].scaled(-check_mesh(vertices, faces).exponent))
     # They are quads of the given surface, not of a half and its image.
     np.testing.assert_array_equal(mesh.surface.faces, faces)
@@ -156,7 +156,7 @@ def test_an_open_surface_with_sizes():
 def test_vertices_on_the_plane_have_an_even_valence(tmp_path):
     vertices, faces = spot(tmp_path)
     mesh = coneflat.quads(vertices, faces, quads=1000)
-    (plane,) = mirror_planes(TriangleMesh(vertices, faces))
+    (plane,) = symmetry_planes(TriangleMesh(vertices, faces))
     on_plane = plane.contains(mesh.vertices)
     assert on_plane.sum() > 20
     assert set(mesh.valences[on_plane]) <= {4, 6}
@@ -164,7 +164,7 @@ def test_vertices_on_the_plane_have_an_even_valence(tmp_path):
 
 def test_the_grid_is_symmetric(tmp_path):
     vertices, faces = mirrored_ball()
-    (plane,) = mirror_planes(TriangleMesh(vertices, faces))
+    (plane,) = symmetry_planes(TriangleMesh(vertices, faces))
     grid = coneflat.integer_grid(vertices, faces, quads=500)
     assert f"The grid is symmetric about {plane}." in grid.notes
     cones = grid.vertices[grid.cones]
@@ -178,41 +178,41 @@ def test_the_grid_is_symmetric(tmp_path):
 class TestPlanes:
     def test_a_cube_has_nine(self):
         vertices, faces = shapes.box(4, (1.0, 1.0, 1.0))
-        planes = list(mirror_planes(TriangleMesh(vertices, faces)))
+        planes = list(symmetry_planes(TriangleMesh(vertices, faces)))
         assert len(planes) == 9
         turn, shift = motion(3)
-        planes = list(mirror_planes(TriangleMesh(vertices @ turn.T + shift, faces)))
+        planes = list(symmetry_planes(TriangleMesh(vertices @ turn.T + shift, faces)))
         assert len(planes) == 9
 
     def test_an_icosahedron_has_fifteen(self):
         vertices, faces = shapes.sphere(1, bumps=0)
         turn, shift = motion(4)
-        assert len(list(mirror_planes(TriangleMesh(vertices @ turn.T + shift, faces)))) == 15
+        assert len(list(symmetry_planes(TriangleMesh(vertices @ turn.T + shift, faces)))) == 15
 
     def test_noise_far_above_rounding_leaves_none(self):
         vertices, faces = mirrored_ball()
         noise = np.random.default_rng(0).normal(size=vertices.shape)
-        assert len(list(mirror_planes(TriangleMesh(vertices + 1e-9 * noise, faces)))) == 1
-        assert not list(mirror_planes(TriangleMesh(vertices + 1e-4 * noise, faces)))
+        assert len(list(symmetry_planes(TriangleMesh(vertices + 1e-9 * noise, faces)))) == 1
+        assert not list(symmetry_planes(TriangleMesh(vertices + 1e-4 * noise, faces)))
 
     def test_a_bumpy_sphere_has_none(self):
-        assert not list(mirror_planes(TriangleMesh(*shapes.sphere(3))))
+        assert not list(symmetry_planes(TriangleMesh(*shapes.sphere(3))))
 
     @pytest.mark.parametrize("side", [1.0, -1.0])
     def test_a_hole_on_one_side_leaves_none(self, side):
         mesh = TriangleMesh(*plate_with_a_hole(side))
         assert mesh.euler_characteristic == 0
-        assert all(abs(plane.normal[2]) > 0.9 for plane in mirror_planes(mesh))
+        assert all(abs(plane.normal[2]) > 0.9 for plane in symmetry_planes(mesh))
         assert half_of(mesh) is None
 
     def test_a_missing_triangle_of_a_box_leaves_none(self):
         vertices, faces = shapes.box(1, (1.0, 1.3, 1.7))
         for face in range(len(faces)):
-            assert not list(mirror_planes(TriangleMesh(vertices, np.delete(faces, face, 0))))
+            assert not list(symmetry_planes(TriangleMesh(vertices, np.delete(faces, face, 0))))
 
     def test_overlapping_parts_that_are_images_of_each_other_have_no_half(self):
         mesh = TriangleMesh(*overlapping_ellipsoids())
-        assert any(abs(plane.normal[0]) > 1 - 1e-9 for plane in mirror_planes(mesh))
+        assert any(abs(plane.normal[0]) > 1 - 1e-9 for plane in symmetry_planes(mesh))
         assert half_of(mesh) is None
 
     def test_a_flat_sheet_is_not_divided_by_its_plane(self):

@@ -28,6 +28,7 @@ _HOMES = {
     "quads_left_out": "files",
     "read_grid": "files",
     "read_quads": "files",
+    "symmetry_planes": "mirror_planes",
     "write_quads_stream": "files",
 }
 
@@ -55,6 +56,7 @@ __all__ = [
     "quads_left_out",
     "read_grid",
     "read_quads",
+    "symmetry_planes",
     "write_quads_stream",
 ]
 
@@ -71,7 +73,7 @@ if TYPE_CHECKING:
         write_quads_stream,
     )
     from .integer_map import IntegerGrid
-    from .mirror_planes import MirrorPlane
+    from .mirror_planes import MirrorPlane, symmetry_planes
     from .mirrored import Half, doubled, half_of
     from .options import QUADS, QuadOptions, Sizes
     from .quad_mesh import QuadMesh

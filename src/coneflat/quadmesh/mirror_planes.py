@@ -80,7 +80,7 @@ class MirrorPlane:
         return f"the plane across ({normal}) at {self.offset:.3g}"
 
 
-def mirror_planes(mesh: TriangleMesh) -> Iterator[MirrorPlane]:
+def symmetry_planes(mesh: TriangleMesh) -> Iterator[MirrorPlane]:
     """Yield the planes of symmetry of a surface among those across the axes, principal axes, and pairs of vertices."""
     size = float(np.ptp(mesh.vertices, axis=0).max())
     centre, moments, axes = _principal_axes(mesh)

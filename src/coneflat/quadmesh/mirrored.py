@@ -14,7 +14,7 @@ from ..mesh.connectivity import TriangleMesh, are_among
 from ..source import Source
 from .features import lengths_along, sharp_edges, split_edges
 from .integer_map import IntegerGrid, grid_of_corners, on_lines
-from .mirror_planes import SAME_PLACE, MirrorPlane, at_seam_ends, mirror_planes, on_seam, seam_edges
+from .mirror_planes import SAME_PLACE, MirrorPlane, at_seam_ends, on_seam, seam_edges, symmetry_planes
 from .quad_mesh import QuadMesh
 from .remesh import part_of
 from .request import GridRequest, names_vertices
@@ -50,7 +50,7 @@ def half_of(mesh: TriangleMesh) -> Half | None:
 
     Of several planes it is that of the shortest cut, along which a grid must have lines.
     """
-    halves = [half for plane in mirror_planes(mesh) if (half := _half_beside(mesh, plane)) is not None]
+    halves = [half for plane in symmetry_planes(mesh) if (half := _half_beside(mesh, plane)) is not None]
     return min(halves, key=lambda half: round(half.length / half.plane.size, 6), default=None)
 
 

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import islice
 
 import numpy as np
 
-from ...quadmesh import MirrorPlane, doubled, half_of
+from ...quadmesh import MirrorPlane, doubled, half_of, symmetry_planes
 from .cut_surface import CutSurface
 from .joining import with_joined_pieces
 from .model import Model
@@ -30,11 +31,16 @@ class HalfModel:
 
 
 def half_of_model(model: Model) -> HalfModel | None:
-    """Return the half of a model with a plane of symmetry along the grain; None if it has none, or seams of its own."""
-    half = half_of(model.mesh) if model.seams is None else None
-    if half is None or abs(model.axis @ half.plane.normal) > IN_PLANE:
+    """Return the half of a model with one plane of symmetry, along the grain; None if it has no such half.
+
+    Models with several planes, such as balls and vases, have no left and right: their seams are shorter without
+    symmetry. A model with seams of its own has no half.
+    """
+    planes = [] if model.seams is not None else list(islice(symmetry_planes(model.mesh), 2))
+    if len(planes) != 1 or abs(model.axis @ planes[0].normal) > IN_PLANE:
         return None
-    return HalfModel(replace(model, mesh=half.mesh), half.plane)
+    half = half_of(model.mesh)
+    return None if half is None else HalfModel(replace(model, mesh=half.mesh), half.plane)
 
 
 def with_images(half: CutSurface, plane: MirrorPlane) -> CutSurface:
