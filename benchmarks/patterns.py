@@ -24,7 +24,7 @@ from drawn import DrawnLine, dxf_lines, overlapping, points_of_file, triangle_st
 
 from coneflat import GuaranteeWarning, TriangleMesh, check_mesh, pattern, unwrap
 from coneflat.apps.patterns import Pattern
-from coneflat.apps.patterns.tabs import glue_tabs
+from coneflat.apps.patterns.net.tabs import glue_tabs
 
 Arrays = tuple[np.ndarray, np.ndarray]
 

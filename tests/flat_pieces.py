@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from coneflat import Pattern, TriangleMesh
-from coneflat.apps.patterns.cut_surface import CutSurface
+from coneflat.apps.patterns.pieces.cut_surface import CutSurface
 
 
 def sheet(width: float = 120.0, height: float = 80.0, columns: int = 6, rows: int = 4) -> CutSurface:

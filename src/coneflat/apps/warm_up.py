@@ -14,8 +14,8 @@ from .. import TriangleMesh, flatten, sample_path, unwrap
 from ..base import FloatArray, IntArray, inner_calls
 from ..geometry import visible_share
 from ..quadmesh import measure_quads, quads
-from .patterns.net import unfold_net
-from .patterns.thickness import thickness_of
+from .patterns.net.net import unfold_net
+from .patterns.sheet.thickness import thickness_of
 
 
 def steps() -> Iterator[tuple[str, Callable[[], object]]]:

@@ -9,17 +9,17 @@ from scipy.spatial import cKDTree
 
 import coneflat
 from coneflat import TriangleMesh
-from coneflat.apps.patterns.borders import find_borders, letters
-from coneflat.apps.patterns.cut_surface import CutSurface
-from coneflat.apps.patterns.equal_sides import with_equal_sides
-from coneflat.apps.patterns.joining import with_joined_pieces
-from coneflat.apps.patterns.least_strain import least_strain
-from coneflat.apps.patterns.power_sum import PowerSum
-from coneflat.apps.patterns.relaxing import excess
-from coneflat.apps.patterns.simplification import simplified
-from coneflat.apps.patterns.slits import slit_until_within
-from coneflat.apps.patterns.smooth_seams import with_smooth_seams
-from coneflat.apps.patterns.strain import FlatEdges, Stretch
+from coneflat.apps.patterns.cloth.joining import with_joined_pieces
+from coneflat.apps.patterns.cloth.simplification import simplified
+from coneflat.apps.patterns.cloth.slits import slit_until_within
+from coneflat.apps.patterns.cloth.smooth_seams import with_smooth_seams
+from coneflat.apps.patterns.pieces.borders import find_borders, letters
+from coneflat.apps.patterns.pieces.cut_surface import CutSurface
+from coneflat.apps.patterns.pieces.equal_sides import with_equal_sides
+from coneflat.apps.patterns.pieces.least_strain import least_strain
+from coneflat.apps.patterns.pieces.power_sum import PowerSum
+from coneflat.apps.patterns.pieces.relaxing import excess
+from coneflat.apps.patterns.pieces.strain import FlatEdges, Stretch
 from coneflat.apps.patterns.units import length_of
 from coneflat.errors import OptionError
 from coneflat.geometry import signed_double_areas, surface_distances

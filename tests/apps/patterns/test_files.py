@@ -12,9 +12,9 @@ from command import command
 from flat_pieces import gores, two_pieces, with_dart
 
 import coneflat
-from coneflat.apps.patterns.files import PATTERN_FORMATS
-from coneflat.apps.patterns.nesting import nested
-from coneflat.apps.patterns.polylines import distances
+from coneflat.apps.patterns.files.files import PATTERN_FORMATS
+from coneflat.apps.patterns.pages.nesting import nested
+from coneflat.apps.patterns.pieces.polylines import distances
 from coneflat.errors import MeshFileError, OptionError, UnknownFormatError
 
 pytest.importorskip("shapely")

@@ -7,9 +7,9 @@ from polyhedra import cube, icosphere, turned, uv_sphere
 from shapes import renumber, rotation, torus
 
 from coneflat import check_mesh
-from coneflat.apps.patterns.borders import find_borders
-from coneflat.apps.patterns.gores import cut_gores
-from coneflat.apps.patterns.shapes import tails
+from coneflat.apps.patterns.drawing.shapes import tails
+from coneflat.apps.patterns.gores.gores import cut_gores
+from coneflat.apps.patterns.pieces.borders import find_borders
 from coneflat.errors import MeshError
 from coneflat.geometry import surface_distances
 

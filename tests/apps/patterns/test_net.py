@@ -17,8 +17,8 @@ from stored_meshes import at_hand
 
 import coneflat
 from coneflat import TriangleMesh, check_mesh
-from coneflat.apps.patterns.net import unfold_net
-from coneflat.apps.patterns.polyhedron import Polyhedron
+from coneflat.apps.patterns.net.net import unfold_net
+from coneflat.apps.patterns.net.polyhedron import Polyhedron
 from coneflat.geometry import coarse_mesh, find_overlaps, signed_double_areas
 
 # Angles between the normals of adjacent faces, and numbers of faces.

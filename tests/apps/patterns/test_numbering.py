@@ -10,8 +10,8 @@ from shapes import renumber
 
 import coneflat
 from coneflat import Pattern, TriangleMesh
-from coneflat.apps.patterns.cut_surface import CutSurface
-from coneflat.apps.patterns.numbering import order_around, order_by_size
+from coneflat.apps.patterns.pieces.cut_surface import CutSurface
+from coneflat.apps.patterns.pieces.numbering import order_around, order_by_size
 
 HEIGHTS = np.linspace(0, 2, 9)
 VASE = turned(0.6 + 0.3 * np.sin(2.5 * HEIGHTS), HEIGHTS)

@@ -12,17 +12,17 @@ from flat_pieces import gores, sheet, two_pieces, with_dart
 
 import coneflat
 from coneflat import Pattern, TriangleMesh
-from coneflat.apps.patterns.allowances import polygon_of, widened
-from coneflat.apps.patterns.borders import find_borders
-from coneflat.apps.patterns.cut_surface import CutSurface
+from coneflat.apps.patterns.drawing.allowances import polygon_of, widened
+from coneflat.apps.patterns.drawing.gaps import notes_on_gaps
+from coneflat.apps.patterns.drawing.labels import box_of
+from coneflat.apps.patterns.drawing.notches import notches_of
+from coneflat.apps.patterns.drawing.shapes import piece_shapes
 from coneflat.apps.patterns.finish import Finish, read_allowances
-from coneflat.apps.patterns.gaps import notes_on_gaps
-from coneflat.apps.patterns.labels import box_of
-from coneflat.apps.patterns.nesting import GAP, grain_up, nested
-from coneflat.apps.patterns.notches import notches_of
-from coneflat.apps.patterns.polylines import distances, ends_of_straight_parts
-from coneflat.apps.patterns.shapes import piece_shapes
-from coneflat.apps.patterns.tabs import Tab
+from coneflat.apps.patterns.net.tabs import Tab
+from coneflat.apps.patterns.pages.nesting import GAP, grain_up, nested
+from coneflat.apps.patterns.pieces.borders import find_borders
+from coneflat.apps.patterns.pieces.cut_surface import CutSurface
+from coneflat.apps.patterns.pieces.polylines import distances, ends_of_straight_parts
 from coneflat.errors import OptionError
 
 shapely = pytest.importorskip("shapely")

@@ -9,13 +9,13 @@ from flat_pieces import gores, sheet, two_pieces
 
 import coneflat
 from coneflat import Pattern
-from coneflat.apps.patterns.assembly import pattern_pages
-from coneflat.apps.patterns.drawing import Drawing, Line
-from coneflat.apps.patterns.labels import box_of
-from coneflat.apps.patterns.nesting import nested
-from coneflat.apps.patterns.pages import cut_shapes, page_map, ruler, tiled
+from coneflat.apps.patterns.drawing.drawing import Drawing, Line
+from coneflat.apps.patterns.drawing.labels import box_of
+from coneflat.apps.patterns.pages.assembly import pattern_pages
+from coneflat.apps.patterns.pages.nesting import nested
+from coneflat.apps.patterns.pages.pages import cut_shapes, page_map, ruler, tiled
+from coneflat.apps.patterns.pages.tiling import tiles_of
 from coneflat.apps.patterns.papers import PAGE_SIZES, Paper
-from coneflat.apps.patterns.tiling import tiles_of
 from coneflat.errors import OptionError
 
 shapely = pytest.importorskip("shapely")

@@ -6,9 +6,9 @@ from polyhedra import box_on_box, cube, icosphere, turned
 from shapes import annulus, box, cylinder, grid, join, renumber, rotation, torus, without
 
 from coneflat import TriangleMesh, check_mesh
-from coneflat.apps.patterns.bends import find_bends
-from coneflat.apps.patterns.sheet import develop_sheet
-from coneflat.apps.patterns.thickness import thickness_of
+from coneflat.apps.patterns.sheet.bends import find_bends
+from coneflat.apps.patterns.sheet.sheet import develop_sheet
+from coneflat.apps.patterns.sheet.thickness import thickness_of
 from coneflat.errors import MeshError
 
 

@@ -7,7 +7,7 @@ import pytest
 from flat_pieces import sheet, two_pieces
 
 from coneflat import Pattern
-from coneflat.apps.patterns.strain_map import is_strained, side_strains, strain_map
+from coneflat.apps.patterns.pages.strain_map import is_strained, side_strains, strain_map
 
 LOW, SIZE = np.array([10.0, 20.0]), np.array([80.0, 90.0])
 

@@ -7,11 +7,11 @@ from polyhedra import cube, dodecahedron, icosahedron, prism
 from test_net import rough
 
 from coneflat import TriangleMesh
-from coneflat.apps.patterns.borders import find_borders
+from coneflat.apps.patterns.drawing.shapes import fold_of_tab, piece_shapes
 from coneflat.apps.patterns.finish import Finish
-from coneflat.apps.patterns.net import unfold_net
-from coneflat.apps.patterns.shapes import fold_of_tab, piece_shapes
-from coneflat.apps.patterns.tabs import glue_tabs
+from coneflat.apps.patterns.net.net import unfold_net
+from coneflat.apps.patterns.net.tabs import glue_tabs
+from coneflat.apps.patterns.pieces.borders import find_borders
 
 SOLIDS = {"cube": cube, "dodecahedron": dodecahedron, "icosahedron": icosahedron, "prism": lambda: prism(9)}
 

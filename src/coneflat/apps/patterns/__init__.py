@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Any
 #: Where names are defined; they are imported when they are first used, since commands need the options alone.
 _HOMES = {
     "KINDS": "options",
-    "PATTERN_FORMATS": "files",
+    "PATTERN_FORMATS": "files.files",
     "PATTERN_MEASURES": "report",
     "Pattern": "result",
     "PatternOptions": "options",
-    "check_pattern_output": "files",
+    "check_pattern_output": "files.files",
     "page_of_pattern": "page",
     "rows_of": "report",
-    "write_pattern": "files",
+    "write_pattern": "files.files",
 }
 
 __all__ = [
@@ -31,7 +31,7 @@ __all__ = [
 ]
 
 if TYPE_CHECKING:
-    from .files import PATTERN_FORMATS, check_pattern_output, write_pattern
+    from .files.files import PATTERN_FORMATS, check_pattern_output, write_pattern
     from .options import KINDS, PatternOptions
     from .page import page_of_pattern
     from .report import PATTERN_MEASURES, rows_of

@@ -11,20 +11,20 @@ from numpy.typing import ArrayLike
 
 from ...base import FloatArray, component_at_work, plural, timing, warns
 from ...options import read_options, settings, takes
-from .cloth import cloth_pieces
-from .cut_surface import piece_areas
-from .development import Development
+from .cloth.cloth import cloth_pieces
+from .drawing.gaps import notes_on_gaps
 from .finish import Finish
-from .gaps import notes_on_gaps
-from .gores import cut_gores
+from .gores.gores import cut_gores
 from .model import Model, read_model
-from .nesting import grain_up, nested
-from .net import unfold_net
-from .numbering import order_around
+from .net.net import unfold_net
+from .net.tabs import glue_tabs
 from .options import PatternOptions
+from .pages.nesting import grain_up, nested
+from .pieces.cut_surface import piece_areas
+from .pieces.development import Development
+from .pieces.numbering import order_around
 from .result import Pattern
-from .sheet import develop_sheet
-from .tabs import glue_tabs
+from .sheet.sheet import develop_sheet
 
 # Fractions of the work that are done after checking the mesh and after cutting it.
 CHECKED, CUT = 0.02, 0.95

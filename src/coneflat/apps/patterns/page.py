@@ -13,12 +13,12 @@ from ...base import FloatArray, IntArray, plural
 from ...measures import angle_sum_errors
 from ...stages import SolveStatistics
 from ..view import PageParts, PageText, check_page, open_page, page_html, write_page
-from .allowances import polygon_of, shapely
-from .borders import Seam
+from .drawing.allowances import polygon_of, shapely
+from .drawing.shapes import tails
+from .pages.strain_map import percentage, side_strains
+from .pieces.borders import Seam
 from .report import rows_of
 from .result import Pattern
-from .shapes import tails
-from .strain_map import percentage, side_strains
 
 # Strain up to which a pattern is as exact as numbers are.
 EXACT = 1e-6

@@ -6,13 +6,13 @@ from typing import Any
 
 import numpy as np
 
-from .allowances import shapely
+from .drawing.allowances import shapely
+from .drawing.shapes import piece_shapes
 from .finish import Finish
+from .pages.strain_map import percentage
+from .pages.tiling import tiles_of
 from .papers import EDGE, Paper
 from .result import Pattern
-from .shapes import piece_shapes
-from .strain_map import percentage
-from .tiling import tiles_of
 from .units import text_of_size
 
 #: Numbers of the report, which `--require` takes.

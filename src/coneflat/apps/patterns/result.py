@@ -12,15 +12,15 @@ from typing import Any
 import numpy as np
 
 from ...base import EntryPoint, FloatArray, IntArray
-from .bends import Bend, find_bends
-from .borders import Borders, Seam, find_borders
-from .cut_surface import CutSurface
-from .drawing import Drawing
+from .drawing.drawing import Drawing
 from .finish import SEWN
-from .tabs import Tab
+from .net.tabs import Tab
+from .pieces.borders import Borders, Seam, find_borders
+from .pieces.cut_surface import CutSurface
+from .sheet.bends import Bend, find_bends
 
-_DRAWING = EntryPoint[Drawing]("apps.patterns.outlines:drawing_of")
-_WRITE = EntryPoint[Path]("apps.patterns.files:write_pattern")
+_DRAWING = EntryPoint[Drawing]("apps.patterns.drawing.outlines:drawing_of")
+_WRITE = EntryPoint[Path]("apps.patterns.files.files:write_pattern")
 _SHOW = EntryPoint[Path]("apps.patterns.page:show_pattern")
 _REPORT = EntryPoint[dict[str, Any]]("apps.patterns.report:report_of")
 

@@ -1,0 +1,1 @@
+"""Cloth: the shortest seams within a bound of the strain."""

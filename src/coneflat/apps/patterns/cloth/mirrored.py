@@ -1,0 +1,57 @@
+"""Symmetric cloth: the pieces of the half beside a plane of symmetry, and their mirror images."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import islice
+
+import numpy as np
+
+from ....quadmesh import MirrorPlane, doubled, half_of, symmetry_planes
+from ..model import Model
+from ..pieces.cut_surface import CutSurface
+from ..pieces.strain import Stretch
+from .joining import with_joined_pieces
+
+# Largest component of the grain along the normal of the plane: the grain of mirror images would point elsewhere.
+IN_PLANE = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class HalfModel:
+    """The half of a symmetric model.
+
+    Attributes:
+        model: the half.
+        plane: the plane of symmetry.
+    """
+
+    model: Model
+    plane: MirrorPlane
+
+
+def half_of_model(model: Model) -> HalfModel | None:
+    """Return the half of a model with one plane of symmetry, along the grain; None if it has no such half.
+
+    Models with several planes, such as balls and vases, have no left and right: their seams are shorter without
+    symmetry. A model with seams of its own has no half.
+    """
+    planes = [] if model.seams is not None else list(islice(symmetry_planes(model.mesh), 2))
+    if len(planes) != 1 or abs(model.axis @ planes[0].normal) > IN_PLANE:
+        return None
+    half = half_of(model.mesh)
+    return None if half is None else HalfModel(replace(model, mesh=half.mesh), half.plane)
+
+
+def with_images(half: CutSurface, plane: MirrorPlane) -> CutSurface:
+    """Return the pieces of the half of a surface, and their mirror images; both meet at seams along the plane."""
+    corners = np.concatenate([half.corners, (half.corners + len(half.points))[:, [0, 2, 1]]])
+    points = np.concatenate([half.points, half.points * [-1, 1]])
+    return CutSurface(doubled(half.mesh, plane).mesh, corners, points)
+
+
+def joined_across(surface: CutSurface, plane: MirrorPlane, stretch: Stretch) -> CutSurface:
+    """Return a symmetric cut surface with pieces joined along the plane where the strain allows it."""
+    ends = surface.mesh.edges[surface.seams]
+    is_across = plane.contains(surface.mesh.vertices)[ends].all(axis=1)
+    return with_joined_pieces(surface, stretch, ends[~is_across])

@@ -1,0 +1,1 @@
+"""What is drawn of the pieces: outlines with allowances, notches, names."""

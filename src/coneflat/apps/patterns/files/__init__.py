@@ -1,0 +1,1 @@
+"""Files: PDF, SVG and DXF."""

@@ -1,0 +1,1 @@
+"""Gores: strips between half-planes through an axis."""

@@ -1,0 +1,1 @@
+"""Nets: exact unfoldings of polyhedra, with glue tabs."""

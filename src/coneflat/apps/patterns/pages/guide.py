@@ -1,0 +1,210 @@
+"""The assembly guide: the model, its pieces and seams, the map of the pages, and a ruler."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ....base import FloatArray, plural
+from ..drawing.drawing import Drawing, Text
+from ..finish import Finish
+from ..papers import IN_INCHES, MARGIN, Paper
+from ..report import piece_sizes
+from ..result import Pattern
+from ..units import area_text, text_of_size
+from .pages import Page, Picture, cut_shapes, page_map, ruler
+from .steps import steps_of
+from .strain_map import is_strained, percentage, strain_map
+from .tables import Table, laid_out
+from .tiling import tiles_of
+from .views import View, eye_and_up, view_of
+
+# Pixels of pictures per millimetre: 200 per inch.
+PIXELS = 200 / 25.4
+# Heights of capitals: titles, texts and numbers of pieces on pictures at most, mm; distance of lines of text.
+TITLE, BODY, NUMBER, LEADING = 5.0, 2.3, 3.4, 4.4
+# Width of the numbers of a list, mm.
+INDENT = 6.0
+# Height of the pictures relative to that of the page, and the smallest one.
+PICTURES, MIN_PICTURES = 0.4, 0.15
+# Widths of a column of text beside the map of the pages, or that of the strain alone, relative to the page; mean width
+# of a character of longer texts relative to the height of capitals.
+TEXT_SHARE, HALF, CHARACTER = 0.66, 0.5, 0.76
+# Space between parts of a page, mm.
+SPACE = 5.0
+
+
+def guide_pages(pattern: Pattern, drawing: Drawing, paper: Paper, title: str) -> list[Page]:
+    """Return the pages of the assembly guide of a pattern.
+
+    Args:
+        pattern: the pattern.
+        drawing: its drawing.
+        paper: the paper of the pattern; the guide of a roll, or of a page as large as the pattern, is on A4.
+        title: the title of the first page.
+    """
+    own_paper = paper if paper.height is not None else Paper.of("A4")
+    tables = [_piece_table(pattern, drawing, paper), *_seam_tables(pattern)]
+    low = np.array([MARGIN, MARGIN])
+    high = np.array([own_paper.width, own_paper.height], dtype=np.float64) - MARGIN
+    return [*_overview(pattern, drawing, paper, own_paper, title), *_table_pages(tables, low, high)]
+
+
+def _table_pages(tables: list[Table], low: FloatArray, high: FloatArray) -> Iterator[Page]:
+    width, height = high + MARGIN
+    for lines, texts in laid_out(tables, low, high):
+        yield Page(Drawing(float(width), float(height), tuple(lines), tuple(texts)))
+
+
+def _overview(
+    pattern: Pattern, drawing: Drawing, paper: Paper, own_paper: Paper, title: str
+) -> Iterator[Page]:
+    """Yield the first page, and a page of notes if there is no room for them."""
+    width, height = own_paper.inner_width, own_paper.inner_height
+    tiles = tiles_of(cut_shapes(drawing), drawing.width, drawing.height, paper)
+    rulers = ruler(np.array([MARGIN, MARGIN]), own_paper)
+    bottom = MARGIN + (25.0 if own_paper.name in IN_INCHES else 14.0)
+    top = MARGIN + height
+    texts = [Text(title, np.array([MARGIN, top - TITLE / 2]), TITLE, is_left=True)]
+    top -= TITLE + SPACE
+    texts += _lines_of_text(_summary(pattern), width, top)
+    top = min(float(text.place[1]) for text in texts) - SPACE
+    # The map is beside the text. Pictures are smaller where steps need their room.
+    has_map, has_strain = len(tiles) > 1 and paper.height is not None, is_strained(pattern)
+    column = (TEXT_SHARE if has_map else HALF if has_strain else 1.0) * width
+    steps = [*_list_of_text(steps_of(pattern, tiles, paper), column, 0.0)]
+    room = top - bottom + float(steps[-1].place[1]) - 3 * SPACE
+    picture_height = max(min(PICTURES * height, room), MIN_PICTURES * height)
+    pictures, numbers = _pictures(pattern, width, picture_height, top)
+    top -= picture_height + SPACE
+    texts += [*numbers, *(replace(text, place=text.place + np.array([0.0, top])) for text in steps)]
+    text_top = top + float(steps[-1].place[1]) - SPACE
+    notes = [*_list_of_text(pattern.notes, column, text_top, numbered=False)]
+    have_room = not notes or float(notes[-1].place[1]) > bottom
+    texts += notes if have_room else []
+    lines, texts = [*rulers.lines], [*texts, *rulers.texts]
+    # Both maps share the column beside the text.
+    place = np.array([MARGIN + column + SPACE, bottom])
+    extent = np.array([width - column - SPACE, (top - bottom) / (has_map + has_strain or 1)])
+    if has_strain:
+        strain_pictures, legend = strain_map(pattern, place, extent - np.array([0.0, has_map * SPACE]))
+        pictures, texts = [*pictures, *strain_pictures], [*texts, *legend.texts]
+        place = place + np.array([0.0, extent[1]])
+    if has_map:
+        small = page_map(drawing, paper, place, extent)
+        lines, texts = [*lines, *small.lines], [*texts, *small.texts]
+    size = width + 2 * MARGIN, height + 2 * MARGIN
+    yield Page(Drawing(*size, tuple(lines), tuple(texts)), pictures=tuple(pictures))
+    if not have_room:
+        notes = [*_list_of_text(pattern.notes, width, MARGIN + height, numbered=False)]
+        yield Page(Drawing(*size, (), tuple(notes)))
+
+
+def _pictures(pattern: Pattern, width: float, height: float, top: float) -> tuple[list[Picture], list[Text]]:
+    """Return the pictures of the model and of its pieces moved apart, with their numbers."""
+    axis = pattern.settings.get("axis")
+    eye, up = eye_and_up(pattern.surface, None if axis is None else np.asarray(axis))
+    picture_width = (width - SPACE) / 2
+    pixels = round(PIXELS * picture_width), round(PIXELS * height)
+    pictures: list[Picture] = []
+    texts: list[Text] = []
+    # A single piece is shown from behind instead of moved apart.
+    behind = 2 * (eye @ up) * up - eye
+    second = (behind, False) if pattern.piece_count == 1 else (eye, True)
+    for i, (direction, apart) in enumerate(((eye, False), second)):
+        low = np.array([MARGIN + i * (picture_width + SPACE), top - height])
+        view = view_of(pattern.surface, pixels, direction, up, apart)
+        pictures.append(Picture(view.pixels, low, picture_width, height))
+        texts += _numbers(view, low, picture_width, height)
+    return pictures, texts
+
+
+def _numbers(view: View, low: FloatArray, width: float, height: float) -> Iterator[Text]:
+    for piece, (place, radius) in view.numbers.items():
+        size = min(NUMBER, 0.9 * radius * height)
+        yield Text(str(piece + 1), low + place * np.array([width, height]), size)
+
+
+def _summary(pattern: Pattern) -> list[str]:
+    """Return what the pattern is, in a few lines."""
+    extents = np.ptp(pattern.surface.mesh.vertices, axis=0).tolist()
+    count = sum(not seam.is_dart for seam in pattern.seams)
+    seams = f", {plural(count, 'seam')}" if count else ""
+    cuts, noun = (pattern.darts, "dart") if pattern.is_sewn else (pattern.corner_cuts, "corner cut")
+    darts = f", {plural(len(cuts), noun)}" if cuts else ""
+    strain = float(np.abs(pattern.strains).max())
+    stretched = f"; lengths change by at most {percentage(strain)}" if strain > 1e-6 else ""
+    finish = Finish.of(pattern.kind, pattern.settings)
+    allowance = (
+        f"seam allowance {finish.allowance:g} mm, included" if finish.allowance else "no seam allowance"
+    )
+    return [
+        f"{pattern.kind}: {plural(pattern.piece_count, 'piece')}{seams}{darts}; "
+        f"finished size {text_of_size(extents)}",
+        f"{allowance}{stretched}",
+    ]
+
+
+def _list_of_text(items: Sequence[str], width: float, top: float, numbered: bool = True) -> Iterator[Text]:
+    """Yield the lines of a list, from the top downward: with numbers, or with dots."""
+    columns = int((width - INDENT) / (CHARACTER * BODY))
+    y = top - BODY / 2
+    for i, item in enumerate(items):
+        mark = f"{i + 1}." if numbered else "\u2022"
+        yield Text(mark, np.array([MARGIN, y]), BODY, is_left=True)
+        for line in textwrap.wrap(item, columns):
+            yield Text(line, np.array([MARGIN + INDENT, y]), BODY, is_left=True)
+            y -= LEADING
+        y -= LEADING / 4
+
+
+def _lines_of_text(paragraphs: Sequence[str], width: float, top: float) -> Iterator[Text]:
+    """Yield lines of text from the top downward."""
+    columns = int(width / (CHARACTER * BODY))
+    lines = [line for paragraph in paragraphs for line in textwrap.wrap(paragraph, columns)]
+    for i, line in enumerate(lines):
+        yield Text(line, np.array([MARGIN, top - i * LEADING - BODY / 2]), BODY, is_left=True)
+
+
+def _piece_table(pattern: Pattern, drawing: Drawing, paper: Paper) -> Table:
+    sizes = piece_sizes(pattern)
+    pages = _pages_of_pieces(pattern, drawing, paper)
+    rows = tuple(
+        (str(i + 1), "1", f"{width:.0f} x {height:.0f}", area_text(area), pages[i])
+        for i, (width, height, area) in enumerate(sizes)
+    )
+    return Table("Pieces", ("number", "cut", "size, mm", "area", "pages"), rows)
+
+
+def _pages_of_pieces(pattern: Pattern, drawing: Drawing, paper: Paper) -> list[str]:
+    """Return the names of the first and the last page on which each piece is."""
+    tiles = tiles_of(cut_shapes(drawing), drawing.width, drawing.height, paper)
+    surface, names = pattern.surface, []
+    for piece in range(pattern.piece_count):
+        points = surface.points[np.unique(surface.corners[surface.pieces == piece])]
+        low, high = points.min(axis=0), points.max(axis=0)
+        tile_names = [tile.name for tile in tiles if (tile.low < high).all() and (tile.high > low).all()]
+        names.append(" to ".join(dict.fromkeys([*tile_names[:1], *tile_names[-1:]])))
+    return names
+
+
+def _seam_tables(pattern: Pattern) -> Iterator[Table]:
+    if not pattern.seams:
+        return
+    rows, has_ease = [], any(seam.is_eased for seam in pattern.seams)
+    for seam in pattern.seams:
+        first, second = (side.piece + 1 for side in seam.sides)
+        pieces = (
+            f"{'dart' if pattern.is_sewn else 'corner cut'} in {first}"
+            if seam.is_dart
+            else f"{first} and {second}"
+            if first != second
+            else f"{first}, itself"
+        )
+        ease = f"{seam.ease:.1f}" if seam.is_eased else ""
+        rows.append((seam.name, pieces, f"{max(seam.lengths):.1f}", *([ease] if has_ease else [])))
+    columns = "name", "pieces", "length, mm", *(["ease, mm"] if has_ease else [])
+    yield Table("Seams", columns, tuple(rows))

@@ -1,0 +1,1 @@
+"""Pieces of a surface in the plane: cuts, borders, strain."""

@@ -1,0 +1,1 @@
+"""Sheets: one piece, with bend lines."""
