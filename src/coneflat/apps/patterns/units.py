@@ -8,8 +8,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-import numpy as np
-
 from ...base import short_repr
 from ...errors import OptionError
 from ...options import Kind
@@ -108,7 +106,7 @@ def text_of_size(extents: Any) -> str:
 
 def text_of_direction(direction: Any) -> str:
     """Return a direction of three numbers as a text that the option axis takes, such as "0,0,1"."""
-    return ",".join(f"{number:.3g}" for number in np.asarray(direction, dtype=float).round(6) + 0.0)
+    return ",".join(f"{round(float(number), 6) + 0.0:.3g}" for number in direction)
 
 
 def area_text(area: float) -> str:
