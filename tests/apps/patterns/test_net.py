@@ -12,13 +12,14 @@ from polyhedra import (
     prism,
     tetrahedron,
 )
-from shapes import box, cylinder, grid, join, renumber, rotation
+from shapes import box, cylinder, grid, join, renumber, rotation, sphere
 from stored_meshes import at_hand
 
 import coneflat
 from coneflat import TriangleMesh, check_mesh
 from coneflat.apps.patterns.net.net import unfold_net
 from coneflat.apps.patterns.net.polyhedron import Polyhedron
+from coneflat.errors import MeshError
 from coneflat.geometry import coarse_mesh, find_overlaps, signed_double_areas
 
 # Angles between the normals of adjacent faces, and numbers of faces.
@@ -139,3 +140,8 @@ def test_a_model_of_many_facets_is_one_piece():
 def test_a_shared_model_is_one_piece(name, shared):
     model = coneflat.read_mesh(shared(name))
     checked(check_mesh(model.vertices, model.triangles).mesh)
+
+
+def test_a_net_that_nobody_can_fold_is_refused():
+    with pytest.raises(MeshError, match="net of 20,480 plane faces.*simplify the mesh"):
+        coneflat.pattern(*sphere(5), height=100, kind="net")

@@ -10,6 +10,7 @@ from scipy.sparse.csgraph import minimum_spanning_tree
 
 from .... import TriangleMesh
 from ....base import BoolArray, FloatArray, IntArray
+from ....errors import MeshError
 from ....geometry import dihedral_angles, double_areas, edge_lengths, face_normals, unit_vectors
 from ....mesh import label_components
 from ..pieces.cut_surface import CutSurface
@@ -19,6 +20,8 @@ from .net_moves import Workspace, place_and_collide, place_pieces, workspace_of
 from .net_search import cut_collisions, join_at, join_longest, untangle
 from .polyhedron import DIGITS, Polyhedron
 
+# Largest number of plane faces. Nobody folds as many; the search would take minutes.
+MAX_FACES = 10_000
 # Comparisons of boxes per triangle, about ten nanoseconds each: for untangling one tree of all faces, for each attempt
 # to join two pieces, for all of these attempts, and for exchanging joined hinges for longer ones.
 TREE_BUDGET, JOIN_BUDGET, ALL_JOINS_BUDGET, EXCHANGE_BUDGET = 250_000, 30_000, 600_000, 600_000
@@ -47,6 +50,9 @@ def unfold_net(mesh: TriangleMesh) -> Development:
     Args:
         mesh: a mesh of any topology whose triangles have area. Coplanar triangles form faces, which are not cut.
 
+    Raises:
+        MeshError: there are more than MAX_FACES faces.
+
     Notes:
         Trees of faces are searched by simulated annealing on the number of overlapping triangles, where a subtree is
         cut off and attached at another edge (similar to L. Zawallich, R. Pajarola, "Unfolding polyhedra via tabu
@@ -55,6 +61,12 @@ def unfold_net(mesh: TriangleMesh) -> Development:
         collisions remain, the tree is cut, and the same search joins pieces.
     """
     polyhedron = Polyhedron.of(mesh)
+    count = int(polyhedron.face.max()) + 1
+    if count > MAX_FACES:
+        raise MeshError(
+            f"a net of {count:,} plane faces, more than {MAX_FACES:,}, cannot be folded: simplify the mesh to 100 to 1,500 "
+            "triangles first"
+        )
     unit = np.sqrt(double_areas(edge_lengths(mesh.vertices, mesh.faces)).sum() / 2)
     faces, order = _faces(polyhedron, unit)
     lengths = np.round(polyhedron.hinge_lengths / unit, DIGITS)
