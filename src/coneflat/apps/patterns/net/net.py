@@ -64,8 +64,8 @@ def unfold_net(mesh: TriangleMesh) -> Development:
     count = int(polyhedron.face.max()) + 1
     if count > MAX_FACES:
         raise MeshError(
-            f"a net of {count:,} plane faces, more than {MAX_FACES:,}, cannot be folded: simplify the mesh to 100 to 1,500 "
-            "triangles first"
+            f"a net of {count:,} plane faces, more than {MAX_FACES:,}, cannot be folded: simplify the mesh to 100 to "
+            "1,500 triangles first"
         )
     unit = np.sqrt(double_areas(edge_lengths(mesh.vertices, mesh.faces)).sum() / 2)
     faces, order = _faces(polyhedron, unit)
