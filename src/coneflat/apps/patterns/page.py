@@ -17,11 +17,12 @@ from ..view import FoldLines, PageParts, PageText, check_page, open_page, page_h
 from .drawing.allowances import polygon_of, shapely
 from .drawing.seam_names import straight_parts
 from .drawing.shapes import tails
-from .pages.strain_map import percentage, side_strains
+from .pages.strain_map import side_strains
 from .pieces.borders import Seam
 from .pieces.cut_surface import CutSurface
 from .report import rows_of
 from .result import Pattern
+from .units import percentage
 
 # Strain up to which a pattern is as exact as numbers are.
 EXACT = 1e-6
