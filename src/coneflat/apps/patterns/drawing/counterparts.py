@@ -56,11 +56,11 @@ def counterparts_of(pattern: Pattern) -> Counterparts:
     shapes = piece_shapes(pattern.surface, pattern.borders, finish, pattern.tabs)
     equal: list[int | None] = [None] * len(shapes)
     mirrored: list[int | None] = [None] * len(shapes)
-    for same in _classes(shapes, pattern.has_grain):
-        for members in (same.equal, same.mirrored):
+    for group in _classes(shapes, pattern.has_grain):
+        for members in (group.equal, group.mirrored):
             for piece in members[1:]:
                 equal[piece] = members[0]
-        for piece, image in zip(same.equal, same.mirrored, strict=False):
+        for piece, image in zip(group.equal, group.mirrored, strict=False):
             mirrored[piece], mirrored[image] = image, piece
     return Counterparts(tuple(equal), tuple(mirrored))
 
@@ -68,13 +68,13 @@ def counterparts_of(pattern: Pattern) -> Counterparts:
 def _classes(shapes: Sequence[PieceShape], has_grain: bool) -> list[_Class]:
     classes: list[_Class] = []
     for piece, shape in enumerate(shapes):
-        for same in classes:
-            first = shapes[same.equal[0]]
+        for group in classes:
+            first = shapes[group.equal[0]]
             if _is_congruent(first, shape, has_grain, is_mirrored=False):
-                same.equal.append(piece)
+                group.equal.append(piece)
                 break
             if _is_congruent(first, shape, has_grain, is_mirrored=True):
-                same.mirrored.append(piece)
+                group.mirrored.append(piece)
                 break
         else:
             classes.append(_Class([piece]))
