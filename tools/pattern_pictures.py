@@ -17,6 +17,12 @@ from measured import Measured
 from PIL import Image, ImageOps
 
 import coneflat
+from coneflat.apps.patterns.drawing.shapes import piece_shapes
+from coneflat.apps.patterns.finish import Finish
+from coneflat.apps.patterns.pages.views import piece_colour, view_of
+from coneflat.apps.view import eye_direction
+from coneflat.apps.view.figures.cone_marks import pixels_of
+from coneflat.geometry import unit_vectors
 
 sys.path.insert(0, str(ROOT / "tests"))
 import polyhedra
@@ -135,6 +141,33 @@ EXAMPLES = {
     ),
     "pattern-bracket": Example(bracket, {"kind": "sheet", "unit": "mm", "axis": (0, 0, 1)}),
 }  # fmt: skip
+
+
+def draw_model_of(pattern: coneflat.Pattern, axes: Any, eye: str, dpi: float) -> None:
+    """Draw a model with its pieces in colours."""
+    size = pixels_of(axes, dpi)
+    view = view_of(
+        pattern.surface, size, unit_vectors(eye_direction(eye, "y")[None])[0], np.array([0.0, 1.0, 0.0])
+    )
+    axes.imshow(view.pixels, extent=(0, size[0], 0, size[1]))
+    axes.axis("off")
+
+
+def draw_pieces(pattern: coneflat.Pattern, axes: Any) -> None:
+    """Draw the pieces of a pattern in the colours of `draw_model_of`, with their seam lines."""
+    drawing, surface = pattern.drawing(), pattern.surface
+    shapes = piece_shapes(surface, pattern.borders, Finish.of(pattern.kind, pattern.settings), pattern.tabs)
+    for piece, shape in enumerate(shapes):
+        axes.fill(*shape.cut_rings[0].T, facecolor=piece_colour(piece), edgecolor="black", linewidth=0.8)
+    for line in drawing.lines:
+        if line.dashes:
+            axes.plot(*line.points.T, color="#4a4a4a", linewidth=0.6, linestyle=(0, (4, 2)))
+    # Lines at the ends of the sheet are not clipped.
+    rim = 0.01 * drawing.width
+    axes.set_xlim(-rim, drawing.width + rim)
+    axes.set_ylim(-rim, drawing.height + rim)
+    axes.set_aspect("equal")
+    axes.axis("off")
 
 
 def has_pdf_reader() -> bool:

@@ -15,7 +15,14 @@ import numpy as np
 from markers import ROOT
 from measured import Measured
 from palette import IMAGES, save_figure_small, save_small
-from pattern_pictures import EXAMPLES, PDF_TO_PNG, has_pdf_reader, pages_picture
+from pattern_pictures import (
+    EXAMPLES,
+    PDF_TO_PNG,
+    draw_model_of,
+    draw_pieces,
+    has_pdf_reader,
+    pages_picture,
+)
 from PIL import Image
 from quad_edges import draw_quads
 from quad_pictures import (
@@ -59,7 +66,7 @@ from comparisons.pictures import draw_layouts
 DPI = 170.0
 GALLERY_DPI = 110.0
 SIDE = 2.6  # Inches of a panel of an atlas.
-FUNCTION_WIDTH = 4.0  # Inches of the pictures of functions, three of which stand side by side.
+FUNCTION_WIDTH = 4.0  # Inches of the pictures of functions, four of which stand side by side.
 
 #: How to look at the models that all kinds of figures are shown of.
 LOOKS: dict[str, dict[str, Any]] = {
@@ -264,6 +271,20 @@ def quad_figure(measured: Measured) -> Any:
     return compose([Row(panels)], dpi=DPI, width=FUNCTION_WIDTH)
 
 
+def pattern_figure(measured: Measured) -> Any:
+    """Return a small figure of the pieces of a pattern, on the model and laid out."""
+    pattern = coneflat.pattern(
+        measured.path("spot"), height="400mm", axis=(0, 1, 0), strain="6%", page="none"
+    )
+    drawing = pattern.drawing()
+    draw_model = partial(draw_model_of, pattern, eye="left-front", dpi=DPI)
+    panels = [
+        Panel(view_aspect(pattern.surface.mesh.vertices, "left-front"), draw_model),
+        Panel(drawing.width / drawing.height, partial(draw_pieces, pattern)),
+    ]
+    return compose([Row(panels)], dpi=DPI, width=FUNCTION_WIDTH)
+
+
 def gallery_figure(model: str, measured: Measured) -> Any:
     """Return a figure of a model with a checkerboard from two sides, and of its layout."""
     result, (up, *eyes) = measured.flattening(model), SIGHTS[model]
@@ -406,6 +427,7 @@ PICTURES: dict[str, tuple[tuple[str, ...], Callable[[Measured], Any]]] = {
     "function-flatten": (("spot",), partial(map_figure, coneflat.flatten)),
     "function-unwrap": (("spot",), partial(map_figure, coneflat.unwrap)),
     "function-quads": (("spot",), quad_figure),
+    "function-pattern": (("spot",), pattern_figure),
     "atlas-shapes": ((), shapes_figure),
     "curvature": (("bunny",), curvature_figure),
     "quarters": (("bunny",), quarters_figure),

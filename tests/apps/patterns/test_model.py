@@ -5,6 +5,7 @@ import pytest
 from shapes import cylinder, grid, sphere, torus
 
 import coneflat
+from coneflat.apps.patterns.units import percentage
 from coneflat.errors import MeshError, OptionError
 
 FLAT = grid(4, 3)
@@ -58,6 +59,14 @@ def test_the_same_width_twice_is_that_width():
 
 def test_strain_of_gores_that_materials_do_not_have_is_noted():
     result = coneflat.pattern(*sphere(2), kind="gores", gores=4, axis=(0, 1, 1), height=100.0)
-    strain = 100 * np.abs(result.strains).max()
-    assert strain > 5
-    assert any(f"change by up to {strain:.2g} %" in note for note in result.notes)
+    strain = np.abs(result.strains).max()
+    assert strain > 0.05
+    assert any(f"change by up to {percentage(strain)}:" in note for note in result.notes)
+
+
+@pytest.mark.parametrize(
+    ("strain", "text"),
+    [(2.4, "240 %"), (0.237, "24 %"), (0.0294, "2.9 %"), (0.00055, "0.055 %"), (12.3, "1,230 %")],
+)
+def test_percentages_have_no_exponents(strain, text):
+    assert percentage(strain) == text

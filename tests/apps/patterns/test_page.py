@@ -13,6 +13,7 @@ from chromium import browser_path
 from click.testing import CliRunner
 from flat_pieces import gores, sheet, two_pieces, with_dart
 
+import coneflat
 from coneflat import Pattern
 from coneflat.apps.cli.main import cli
 from coneflat.apps.patterns import page_of_pattern
@@ -67,10 +68,92 @@ def test_the_tip_of_a_dart_is_a_cone_that_opens_as_far():
 
 def test_names_of_seams():
     parts = parts_of(two_pieces(shrink=0.9))
-    assert parts.seam_names == ["A"]
+    assert parts.names == ["A"]
     assert parts.seam_texts == ["Seam A, 80.0 mm eased to 72.0 mm"]
     assert parts_of(with_dart()).seam_texts[0].startswith("Dart A, ")
-    assert parts_of(gores(8)).seam_names == list("ABCDEFGH")
+    assert parts_of(gores(8)).names == list("ABCDEFGH")
+
+
+def test_edges_of_a_net_have_the_names_of_its_straight_parts():
+    cube = net_of_cube()
+    parts, drawn = parts_of(cube), [text.text for text in cube.drawing().texts]
+    assert len(parts.names) == 7  # edges of a cube that are cut
+    assert all(drawn.count(name) == 2 for name in parts.names)
+    surface = cube.surface
+    edges = surface.seams[np.argsort(parts.edge_names)]
+    assert np.array_equal(np.bincount(parts.edge_names), np.ones(7))
+    assert len(edges) == 7
+    for number, name in enumerate(parts.names):
+        seam = cube.seams[parts.seams[np.flatnonzero(parts.edge_names == number)[0]]]
+        assert name.rstrip("0123456789") == seam.name
+
+
+def net_of_cube():
+    return coneflat.pattern(*shapes.box(1), kind="net", unit="mm", scale=50)
+
+
+def bracket():
+    """A strip that is bent up by a right angle along x = z = 0, and back about a cylinder around x = -10, z = 40."""
+    turn = np.linspace(0, np.pi / 2, 7)
+    arc = np.stack([10 * np.cos(turn) - 10, 40 + 10 * np.sin(turn)], axis=1)
+    profile = np.concatenate([[[60, 0], [0, 0]], arc, [[-60, 50]]])
+    vertices = np.concatenate([np.insert(profile, 1, y, axis=1) for y in (0.0, 30.0)])
+    first = np.arange(len(profile) - 1)
+    quads = np.stack([first, first + 1, first + 1 + len(profile), first + len(profile)], axis=1)
+    return coneflat.pattern(
+        vertices, np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]]), kind="sheet", unit="mm"
+    )
+
+
+@pytest.mark.parametrize("make", [net_of_cube, bracket])
+def test_folds_are_the_same_on_the_model_and_in_the_plane(make):
+    pattern = make()
+    folds, extent = parts_of(pattern).folds, np.ptp(pattern.surface.points, axis=0).max()
+    assert len(folds.uv) == len(pattern.folds) + len(pattern.bends) > 1
+    on_model, in_plane = (
+        np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) for ends in (folds.places, folds.uv)
+    )
+    assert on_model == pytest.approx(in_plane * extent)
+    expected = [line.points for line in pattern.drawing().lines if line.layer == "fold"][-len(folds.uv) :]
+    low = pattern.surface.points.min(axis=0)
+    assert folds.uv * extent + low == pytest.approx(np.array(expected))
+
+
+def test_bends_are_in_their_places_on_the_model():
+    pattern = bracket()
+    model, places = pattern.surface.mesh.vertices, parts_of(pattern).folds.places
+    assert [bend.angle > 0 for bend in pattern.bends] == parts_of(pattern).folds.is_mountain.tolist()
+    origin = model.max(axis=0) - [60, 30, 50]  # models are centred
+    for bend, ends in zip(pattern.bends, places - origin, strict=True):
+        axis = [-10.0, 40.0] if bend.radius else [0.0, 0.0]
+        off = np.linalg.norm(ends[:, [0, 2]] - axis, axis=1)
+        assert (off <= bend.radius + 1e-6).all()
+        assert (off >= bend.radius * np.cos(np.pi / 24) - 1e-6).all()
+        assert sorted(ends[:, 1]) == pytest.approx([0, 30])
+
+
+@needs_browser
+def test_folds_and_names_of_parts_in_a_browser(browser, tmp_path):
+    path, pattern = tmp_path / "page.html", net_of_cube()
+    path.write_text(page_of_pattern(pattern, show="plain"))
+    visit = Visit(browser, path)
+    assert visit.page.inner_text("#cones") == "Folds"
+    for pane in ("model", "layout"):
+        visit.run("coneflat.state.set({cones: true})")
+        assert blue_pixels(visit.picture(pane)) > 100
+        visit.run("coneflat.state.set({cones: false})")
+        assert blue_pixels(visit.picture(pane)) == 0
+    names = parts_of(pattern).names
+    for edge, number in enumerate(parts_of(pattern).edge_names.tolist()):
+        visit.run(f"coneflat.state.set({{picked: {{kind: 'seam', index: {edge}}}, hovered: null}})")
+        is_divided = names[number] not in [seam.name for seam in pattern.seams]
+        assert (f"here {names[number]}" in visit.page.inner_text("#facts")) == is_divided
+    visit.close()
+
+
+def blue_pixels(picture):
+    red, green, blue = np.moveaxis(picture.astype(int), 2, 0)[:3]
+    return int(((blue > 150) & (red < 100) & (green < 130)).sum())
 
 
 def test_a_pattern_is_viewed(tmp_path):
@@ -92,8 +175,8 @@ def test_the_command_writes_only_the_page_if_nothing_else_is_asked_for(tmp_path,
     head = json.loads(page.split('id="head">')[1].split("</script>")[0])
     assert head["show"] == "charts"
     assert "1 piece" in head["title"]
-    names = head["parts"]["seam_names"]
-    assert names == list("ABCDEFG"[: len(names)])
+    assert len(head["parts"]["names"]) == 7  # edges of a cube
+    assert head["parts"]["folds"] == head["parts"]["mountains"] == 5
     assert head["seams"] == 7  # edges of a cube
     assert [row[0] for row in head["rows"]][:3] == ["size", "pieces", "seams"]
     done = CliRunner().invoke(cli, [*run, "box.pdf"])

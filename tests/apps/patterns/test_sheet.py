@@ -9,6 +9,7 @@ from coneflat import TriangleMesh, check_mesh
 from coneflat.apps.patterns.sheet.bends import find_bends
 from coneflat.apps.patterns.sheet.sheet import develop_sheet
 from coneflat.apps.patterns.sheet.thickness import thickness_of
+from coneflat.apps.patterns.units import percentage
 from coneflat.errors import MeshError
 
 
@@ -187,7 +188,7 @@ def test_a_stretched_component_leaves_the_bends_of_the_others():
     (note,) = developed.notes
     assert note.startswith(f"no bend lines in 1 of 3 pieces ({stretched + 1})")
     strain = np.abs(developed.surface.edges.strains(developed.surface.points)).max()
-    assert f"by up to {100 * strain:.2g} %;" in note
+    assert f"by up to {percentage(strain)};" in note
     assert develop_sheet(bent).notes == ()
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -12,13 +13,16 @@ from ... import Flattening, measure
 from ...base import FloatArray, IntArray, plural
 from ...measures import angle_sum_errors
 from ...stages import SolveStatistics
-from ..view import PageParts, PageText, check_page, open_page, page_html, write_page
+from ..view import FoldLines, PageParts, PageText, check_page, open_page, page_html, write_page
 from .drawing.allowances import polygon_of, shapely
+from .drawing.seam_names import straight_parts
 from .drawing.shapes import tails
-from .pages.strain_map import percentage, side_strains
+from .pages.strain_map import side_strains
 from .pieces.borders import Seam
+from .pieces.cut_surface import CutSurface
 from .report import rows_of
 from .result import Pattern
+from .units import percentage
 
 # Strain up to which a pattern is as exact as numbers are.
 EXACT = 1e-6
@@ -28,11 +32,8 @@ def page_of_pattern(pattern: Pattern, *, name: str = "Pattern", show: str = "cha
     """Return the HTML page of a pattern; arguments and errors are those of `page_html`."""
     strain = float(np.abs(pattern.strains).max())
     cuts, noun = (pattern.darts, "dart") if pattern.is_sewn else (pattern.corner_cuts, "corner cut")
-    parts = [
-        plural(pattern.piece_count, "piece"),
-        plural(len(pattern.seams) - len(cuts), "seam"),
-        plural(len(cuts), noun),
-    ]
+    counts = {"piece": pattern.piece_count, "seam": len(pattern.seams) - len(cuts), noun: len(cuts)}
+    parts = [plural(count, counted) for counted, count in counts.items() if count]
     if strain > EXACT:
         parts.append(f"strain {percentage(strain)}")
     text = PageText(title="  ·  ".join(parts), rows=rows_of(pattern))
@@ -54,7 +55,7 @@ def as_flattening(pattern: Pattern) -> Flattening:
     surface = pattern.surface
     mesh, points = surface.mesh, surface.points
     extent = float(np.ptp(points, axis=0).max())
-    uv = (points - points.min(axis=0)) / extent
+    uv = _as_uv(surface, points)
     corner_uv = uv[surface.corners]
     unknown, errors = (
         np.full(len(mesh.vertices), np.nan),
@@ -84,21 +85,63 @@ def as_flattening(pattern: Pattern) -> Flattening:
     )
 
 
+def _as_uv(surface: CutSurface, points: FloatArray) -> FloatArray:
+    """Return points (..., 2) of the plane of the pieces in the unit square."""
+    return np.asarray((points - surface.points.min(axis=0)) / float(np.ptp(surface.points, axis=0).max()))
+
+
 def parts_of(pattern: Pattern) -> PageParts:
     """Return what a page shows of the pieces and the seams of a pattern."""
     surface = pattern.surface
-    seam_of_edge = np.empty(len(surface.mesh.edges), dtype=np.int64)
+    seam_of_edge, name_of_edge = np.empty((2, len(surface.mesh.edges)), dtype=np.int64)
+    names: list[str] = []
     for number, seam in enumerate(pattern.seams):
-        seam_of_edge[surface.mesh.halfedge_edges[seam.sides[0].halfedges]] = number
+        edges = surface.mesh.halfedge_edges[seam.sides[0].halfedges]
+        seam_of_edge[edges] = number
+        for name, begin, end in _named_parts(pattern, seam):
+            name_of_edge[edges[begin:end]] = len(names)
+            names.append(name)
     return PageParts(
         pieces=surface.pieces,
         anchors=_anchors(pattern),
         seams=seam_of_edge[surface.seams],
-        seam_names=[seam.name for seam in pattern.seams],
         seam_texts=[_seam_text(seam, pattern.is_sewn) for seam in pattern.seams],
+        names=names,
+        edge_names=name_of_edge[surface.seams],
         strain=side_strains(pattern.surface),
         strain_title="Strain: largest change of a side, at true scale",
+        folds=_folds(pattern),
     )
+
+
+def _named_parts(pattern: Pattern, seam: Seam) -> Iterator[tuple[str, int, int]]:
+    """Yield the names of a seam as they are drawn, and the edges of its first side from and to which they are."""
+    if pattern.is_sewn:
+        yield seam.name, 0, len(seam.sides[0].halfedges)
+    else:
+        yield from straight_parts(seam, pattern.surface.points)
+
+
+def _folds(pattern: Pattern) -> FoldLines:
+    """Return the folds of a net, and the centre lines of the bends of a sheet."""
+    surface, bends = pattern.surface, pattern.bends
+    lines = np.array([bend.line for bend in bends]).reshape(-1, 2, 2)
+    ends = np.concatenate([surface.points[pattern.folds], lines])
+    angles = np.concatenate([pattern.fold_angles, [bend.angle for bend in bends]])
+    bent = [[_place_on_model(surface, bend.piece, point) for point in bend.line] for bend in bends]
+    folded = surface.mesh.vertices[_vertex_of_points(surface)[pattern.folds]]
+    places = np.concatenate([folded, np.array(bent).reshape(-1, 2, 3)])
+    return FoldLines(places, _as_uv(surface, ends), angles > 0)
+
+
+def _place_on_model(surface: CutSurface, piece: int, point: FloatArray) -> FloatArray:
+    """Return (3,) the place on the model of a point of a piece; beside the piece, in the plane of its next triangle."""
+    triangles = np.flatnonzero(surface.pieces == piece)
+    triangle = triangles[_depths(surface.places[triangles], point).argmax()]
+    origin, *corners = surface.places[triangle]
+    weights = np.linalg.solve((np.array(corners) - origin).T, point - origin)
+    origin, *corners = surface.mesh.vertices[surface.mesh.faces[triangle]]
+    return np.asarray(origin + weights @ (np.array(corners) - origin))
 
 
 def _seam_text(seam: Seam, is_sewn: bool) -> str:
@@ -110,10 +153,15 @@ def _seam_text(seam: Seam, is_sewn: bool) -> str:
 
 def _tips(pattern: Pattern) -> IntArray:
     """Return the vertices at the tips of darts."""
-    surface = pattern.surface
+    vertex = _vertex_of_points(pattern.surface)
+    return np.unique(vertex[[dart.tip for dart in pattern.darts if dart.tip is not None]])
+
+
+def _vertex_of_points(surface: CutSurface) -> IntArray:
+    """Return (u,) the vertex of the model of each point of the pieces."""
     vertex = np.empty(len(surface.points), dtype=np.int64)
     vertex[surface.corners] = surface.mesh.faces
-    return np.unique(vertex[[dart.tip for dart in pattern.darts if dart.tip is not None]])
+    return vertex
 
 
 def _anchors(pattern: Pattern) -> IntArray:

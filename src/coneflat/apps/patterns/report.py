@@ -9,11 +9,10 @@ import numpy as np
 from .drawing.allowances import shapely
 from .drawing.shapes import piece_shapes
 from .finish import Finish
-from .pages.strain_map import percentage
 from .pages.tiling import tiles_of
 from .papers import EDGE, Paper
 from .result import Pattern
-from .units import text_of_size
+from .units import percentage, text_of_size
 
 #: Numbers of the report, which `--require` takes.
 PATTERN_MEASURES = (
@@ -43,6 +42,7 @@ def report_of(pattern: Pattern) -> dict[str, Any]:
         for seam in pattern.seams
     ]
     area = float(sum(shape.inside.area for shape in shapes))
+    copies = pattern.counterparts
     return {
         "kind": pattern.kind,
         "pieces": pattern.piece_count,
@@ -61,13 +61,24 @@ def report_of(pattern: Pattern) -> dict[str, Any]:
         "pages": len(tiles_of(cut, width, height, paper)) if paper.height is not None else 1,
         "millimetres_per_unit": pattern.millimetres,
         "each_piece": [
-            {"number": i + 1, "width": piece_width, "height": piece_height, "area": piece_area}
+            {
+                "number": i + 1,
+                "width": piece_width,
+                "height": piece_height,
+                "area": piece_area,
+                "same_as": _number(copies.equal[i]),
+                "mirror_image_of": _number(copies.mirrored[i]),
+            }
             for i, (piece_width, piece_height, piece_area) in enumerate(piece_sizes(pattern))
         ],
         "each_seam": seams,
         "notes": list(pattern.notes),
         "settings": dict(pattern.settings),
     }
+
+
+def _number(piece: int | None) -> int | None:
+    return None if piece is None else piece + 1
 
 
 def rows_of(pattern: Pattern, report: dict[str, Any] | None = None) -> list[tuple[str, str, str]]:

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from ...base import EntryPoint, FloatArray, IntArray
+from .drawing.counterparts import Counterparts
 from .drawing.drawing import Drawing
 from .finish import SEWN
 from .net.tabs import Tab
@@ -20,6 +21,7 @@ from .pieces.cut_surface import CutSurface
 from .sheet.bends import Bend, find_bends
 
 _DRAWING = EntryPoint[Drawing]("apps.patterns.drawing.outlines:drawing_of")
+_COUNTERPARTS = EntryPoint[Counterparts]("apps.patterns.drawing.counterparts:counterparts_of")
 _WRITE = EntryPoint[Path]("apps.patterns.files.files:write_pattern")
 _SHOW = EntryPoint[Path]("apps.patterns.page:show_pattern")
 _REPORT = EntryPoint[dict[str, Any]]("apps.patterns.report:report_of")
@@ -96,6 +98,11 @@ class Pattern:
     def bends(self) -> tuple[Bend, ...]:
         """The bends of a sheet; none of other kinds, and of pieces that are stretched."""
         return find_bends(self.surface) if self.kind == "sheet" else ()
+
+    @cached_property
+    def counterparts(self) -> Counterparts:
+        """Which pieces have the same shape, and which are mirror images of each other."""
+        return _COUNTERPARTS(self)
 
     @cached_property
     def strains(self) -> FloatArray:

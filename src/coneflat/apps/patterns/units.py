@@ -109,6 +109,11 @@ def text_of_direction(direction: Any) -> str:
     return ",".join(f"{round(float(number), 6) + 0.0:.3g}" for number in direction)
 
 
+def percentage(strain: float) -> str:
+    """Return a strain in per cent, with two digits or more."""
+    return f"{100 * strain:,.0f} %" if abs(strain) >= 0.1 else f"{100 * strain:.2g} %"
+
+
 def area_text(area: float) -> str:
     """Return an area in mm^2 as a text in square centimetres, with three digits or more."""
     centimetres = area / 100

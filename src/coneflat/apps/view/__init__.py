@@ -13,7 +13,7 @@ from .figures.render import Barycentrics
 from .figures.uv_layout import draw_layout, fill_layout, layout_aspect
 from .from_uv import own_flattening, shown_rows, uv_flattening
 from .page.content import Model, content_of, outline_halfedges
-from .page.parts import PageParts
+from .page.parts import FoldLines, PageParts
 from .page.payload import PageText, head_and_block, pack, text_of
 from .page.webpage import (
     check_page,
@@ -29,8 +29,8 @@ from .quantity import Quantity, Ranges, conformal_distortion, own_quantity
 from .upward import upward_axis
 
 __all__ = [
-    "Barycentrics", "DOT_REACH", "Eye", "Look", "Model", "PageParts", "PageText", "Panel", "Quantity", "Ranges",
-    "Row", "UVFaults", "check_figure", "check_page", "common_ranges", "comparison_html", "compose",
+    "Barycentrics", "DOT_REACH", "Eye", "FoldLines", "Look", "Model", "PageParts", "PageText", "Panel", "Quantity",
+    "Ranges", "Row", "UVFaults", "check_figure", "check_page", "common_ranges", "comparison_html", "compose",
     "conformal_distortion", "content_of", "demo_figure", "draw_checker", "draw_cones", "draw_layout", "draw_quantity",
     "eye_direction", "fill_layout", "head_and_block", "layout_aspect", "make_figure", "mark_handles", "mark_scale",
     "new_figure", "notebook_html", "open_address", "open_page", "outline_halfedges", "own_flattening", "own_quantity",

@@ -44,15 +44,26 @@ def names_of(kind: str, seam: Seam, points: FloatArray, is_single: bool) -> Iter
             yield SeamName(text, side.piece, points[side.points])
         return
     first, second = (points[side.points] for side in seam.sides)
-    ends = ends_of_straight_parts(first, second[::-1])
-    for i, (begin, end) in enumerate(pairwise(ends.tolist())):
-        name = f"{seam.name}{i + 1}" if len(ends) > 2 else seam.name
+    for name, begin, end in straight_parts(seam, points):
         back = slice(len(second) - 1 - end, len(second) - begin)
         for side, partner, line in (
             (*seam.sides, first[begin : end + 1]),
             (*seam.sides[::-1], second[back]),
         ):
             yield SeamName(name if is_single else f"{name} ({partner.piece + 1})", side.piece, line)
+
+
+def straight_parts(seam: Seam, points: FloatArray) -> Iterator[tuple[str, int, int]]:
+    """Yield the name of each straight part of a seam, and where on its first side it begins and ends.
+
+    Args:
+        seam: the seam.
+        points: (u, 2) the points of the pieces.
+    """
+    first, second = (points[side.points] for side in seam.sides)
+    ends = ends_of_straight_parts(first, second[::-1])
+    for i, (begin, end) in enumerate(pairwise(ends.tolist())):
+        yield f"{seam.name}{i + 1}" if len(ends) > 2 else seam.name, begin, end
 
 
 def _name_of_side(seam: Seam, side: Side, partner: str) -> str:

@@ -15,7 +15,7 @@ from ....mesh import tie_key
 from ..pieces.cut_surface import CutSurface
 from ..pieces.development import Development
 from ..pieces.relaxing import least_strained
-from ..units import text_of_direction
+from ..units import percentage, text_of_direction
 from .half_planes import AroundAxis
 
 # Digits of radii and keys by which the vertex of the first half-plane is chosen: rounding errors are smaller.
@@ -60,7 +60,7 @@ def _notes_on_strain(flat: CutSurface, strips: _Strips) -> Iterator[str]:
     if strain > NOTED_STRAIN:
         yield (
             f"lengths of {strips.count} gores around the axis {text_of_direction(strips.axis)} change by up to "
-            f"{100 * strain:.2g} %: more gores, another axis, or kind cloth change them less"
+            f"{percentage(strain)}: more gores, another axis, or kind cloth change them less"
         )
 
 

@@ -14,10 +14,10 @@ from ..finish import Finish
 from ..papers import IN_INCHES, MARGIN, Paper
 from ..report import piece_sizes
 from ..result import Pattern
-from ..units import area_text, text_of_size
+from ..units import area_text, percentage, text_of_size
 from .pages import Page, Picture, cut_shapes, page_map, ruler
 from .steps import steps_of
-from .strain_map import is_strained, percentage, strain_map
+from .strain_map import is_strained, strain_map
 from .tables import Table, laid_out
 from .tiling import tiles_of
 from .views import View, eye_and_up, view_of
@@ -82,7 +82,8 @@ def _overview(
     top -= picture_height + SPACE
     texts += [*numbers, *(replace(text, place=text.place + np.array([0.0, top])) for text in steps)]
     text_top = top + float(steps[-1].place[1]) - SPACE
-    notes = [*_list_of_text(pattern.notes, column, text_top, numbered=False)]
+    sentences = [_sentence(note) for note in pattern.notes]
+    notes = [*_list_of_text(sentences, column, text_top, numbered=False)]
     have_room = not notes or float(notes[-1].place[1]) > bottom
     texts += notes if have_room else []
     lines, texts = [*rulers.lines], [*texts, *rulers.texts]
@@ -99,7 +100,7 @@ def _overview(
     size = width + 2 * MARGIN, height + 2 * MARGIN
     yield Page(Drawing(*size, tuple(lines), tuple(texts)), pictures=tuple(pictures))
     if not have_room:
-        notes = [*_list_of_text(pattern.notes, width, MARGIN + height, numbered=False)]
+        notes = [*_list_of_text(sentences, width, MARGIN + height, numbered=False)]
         yield Page(Drawing(*size, (), tuple(notes)))
 
 
@@ -161,6 +162,11 @@ def _list_of_text(items: Sequence[str], width: float, top: float, numbered: bool
         y -= LEADING / 4
 
 
+def _sentence(note: str) -> str:
+    """Return a note with a capital and a full stop."""
+    return f"{note[0].upper()}{note[1:].removesuffix('.')}."
+
+
 def _lines_of_text(paragraphs: Sequence[str], width: float, top: float) -> Iterator[Text]:
     """Yield lines of text from the top downward."""
     columns = int(width / (CHARACTER * BODY))
@@ -172,11 +178,35 @@ def _lines_of_text(paragraphs: Sequence[str], width: float, top: float) -> Itera
 def _piece_table(pattern: Pattern, drawing: Drawing, paper: Paper) -> Table:
     sizes = piece_sizes(pattern)
     pages = _pages_of_pieces(pattern, drawing, paper)
+    shapes = _shape_texts(pattern)
+    has_shapes = any(shapes)
     rows = tuple(
-        (str(i + 1), "1", f"{width:.0f} x {height:.0f}", area_text(area), pages[i])
+        (
+            str(i + 1),
+            "1",
+            f"{width:.0f} x {height:.0f}",
+            area_text(area),
+            pages[i],
+            *([shapes[i]] if has_shapes else []),
+        )
         for i, (width, height, area) in enumerate(sizes)
     )
-    return Table("Pieces", ("number", "cut", "size, mm", "area", "pages"), rows)
+    columns = "number", "cut", "size, mm", "area", "pages", *(["shape"] if has_shapes else [])
+    return Table("Pieces", columns, rows)
+
+
+def _shape_texts(pattern: Pattern) -> list[str]:
+    """Return of each piece which other one has its shape, and of which one it is the mirror image."""
+    copies = pattern.counterparts
+    return [
+        ", ".join(
+            [
+                *([f"as {equal + 1}"] if equal is not None else []),
+                *([f"mirror image of {mirrored + 1}"] if mirrored is not None else []),
+            ]
+        )
+        for equal, mirrored in zip(copies.equal, copies.mirrored, strict=True)
+    ]
 
 
 def _pages_of_pieces(pattern: Pattern, drawing: Drawing, paper: Paper) -> list[str]:

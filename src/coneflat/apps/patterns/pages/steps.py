@@ -48,7 +48,17 @@ def _cutting(pattern: Pattern) -> str:
     )
     if pattern.has_grain:
         text += " Lay them on the cloth with the arrow along its grain."
-    return f"{text} Transfer numbers, notches{' and the tips of darts' if pattern.darts else ''}."
+    text += _doubled_cloth(pattern)
+    marks = "numbers, notches and the tips of darts" if pattern.darts else "numbers and notches"
+    return f"{text} Transfer {marks}."
+
+
+def _doubled_cloth(pattern: Pattern) -> str:
+    """Return that mirrored pieces are cut in pairs, if there are any."""
+    pairs = [f"{piece + 1} and {image + 1}" for piece, image in pattern.counterparts.pairs]
+    if not pairs:
+        return ""
+    return f" Mirror images may be cut together from doubled cloth, with the paper of one of them: {'; '.join(pairs)}."
 
 
 def _folding_and_joining(pattern: Pattern) -> Iterator[str]:

@@ -10,6 +10,7 @@ from ....geometry import double_areas, edge_lengths, fill_nearest
 from ..drawing.drawing import Drawing, Text
 from ..pieces.cut_surface import CutSurface
 from ..result import Pattern
+from ..units import percentage
 from .pages import Picture
 
 # Strain from which there is a map: the pieces are exact below.
@@ -30,11 +31,6 @@ def side_strains(surface: CutSurface) -> FloatArray:
     strains = flat / edge_lengths(surface.mesh.vertices, surface.mesh.faces) - 1
     largest = np.abs(strains).argmax(axis=1)[:, None]
     return np.take_along_axis(strains, largest, axis=1)[:, 0]
-
-
-def percentage(strain: float) -> str:
-    """Return a strain in per cent, with two digits."""
-    return f"{100 * strain:.0f} %" if abs(strain) >= 0.1 else f"{100 * strain:.2g} %"
 
 
 def is_strained(pattern: Pattern) -> bool:

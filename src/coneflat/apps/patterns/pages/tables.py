@@ -83,8 +83,7 @@ def _draw(
     """Draw a part of a table, and return its lower end."""
     widths = table.widths
     middle = left + np.cumsum(widths) - np.array(widths) / 2
-    title = left + text_width(table.title, HEADING) / 2
-    texts.append(Text(table.title, np.array([title, top - HEADING / 2]), HEADING))
+    texts.append(Text(table.title, np.array([left, top - HEADING / 2]), HEADING, is_left=True))
     y = top - HEADING - ROW
     texts += _row(table.columns, middle, y)
     y -= ROW / 2

@@ -16,6 +16,7 @@ from ..pieces.cut_surface import CutSurface, lengths_of_edges
 from ..pieces.development import Development
 from ..pieces.relaxing import least_strained
 from ..pieces.separation import without_overlaps
+from ..units import percentage
 from .bends import DEVELOPABLE, largest_strains
 from .thickness import thickness_of
 
@@ -60,7 +61,7 @@ def _notes_on_strain(surface: CutSurface) -> Iterator[str]:
     if len(pieces):
         yield (
             f"no bend lines in {len(pieces)} of {plural(len(strains), 'piece')} ({list_some((pieces + 1).tolist())}), "
-            f"curved in two directions: lengths change by up to {100 * strains.max():.2g} %; kinds gores and cloth "
+            f"curved in two directions: lengths change by up to {percentage(strains.max())}; kinds gores and cloth "
             "change them less"
         )
 

@@ -23,7 +23,7 @@ class Controls {
     this.part("title").textContent = this.part("title").title = head.title + thinned;
     this.part("show").replaceChildren(...showsOf(this.viewer.model).map(([key, name]) => new Option(name, key)));
     this.part("key-shows").textContent = `show: ${showsOf(this.viewer.model).slice(0, 9).map(([key, name], i) => `${i + 1} ${key === "own" ? name : name.toLowerCase()}`).join(", ")}`;
-    this.part("cones").textContent = head.parts ? "Darts" : "Cones";
+    this.part("cones").textContent = head.parts?.folds ? "Folds" : head.parts ? "Darts" : "Cones";
     this.part("table").replaceChildren(...this.reportParts(head, shown));
     this.part("legend").replaceChildren(...this.legendParts(head));
   }

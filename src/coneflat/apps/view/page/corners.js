@@ -125,6 +125,17 @@ function outlineLines(model, inPlane) {
   return [begins, ends];
 }
 
+/** Return the ends of the folds of pieces that are mountains, or of those that are valleys; none without pieces. */
+function foldLines(model, inPlane, areMountains) {
+  const begins = [], ends = [], {fold_places, fold_uv} = model.arrays, {folds, mountains} = model.head.parts ?? {folds: 0, mountains: 0};
+  const at = (end) => (inPlane ? model.planePlace(fold_uv[2 * end], fold_uv[2 * end + 1]) : fold_places.subarray(3 * end, 3 * end + 3));
+  for (let fold = areMountains ? 0 : mountains; fold < (areMountains ? mountains : folds); fold++) {
+    begins.push(...at(2 * fold));
+    ends.push(...at(2 * fold + 1));
+  }
+  return [begins, ends];
+}
+
 /** Return the positions of dots, and for each its radius in pixels, the sign of the curvature, and the index of the cone. */
 function coneDots(model, inPlane) {
   const places = [], looks = [];

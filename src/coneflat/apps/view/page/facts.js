@@ -64,7 +64,8 @@ function seamFacts(model, index) {
   const between = charts[0] === charts[1] ? `within ${part} ${charts[0]}` : `between ${part}s ${charts[0]} and ${charts[1]}`;
   // The page has single precision, about seven digits.
   const equal = off < 1e-4 ? "both sides of equal length" : `lengths of the sides differ by ${(100 * off).toPrecision(2)}%`;
-  if (model.head.parts) return [model.head.parts.seam_texts[model.arrays.seam_numbers[index]], between, `edge ${ends.join("–")}`];
+  const parts = model.head.parts, isDivided = parts && model.namedEdges(index).length > 1;
+  if (parts) return [parts.seam_texts[model.arrays.seam_numbers[index]], ...(isDivided ? [`here ${model.nameAt(index)}`] : []), between, `edge ${ends.join("–")}`];
   const count = model.edgesOfSeam(index).length;
   return [`Seam edge ${ends.join("–")}`, count === 1 ? "a seam of one edge" : `a seam of ${grouped(count)} edges`, between, equal];
 }

@@ -40,6 +40,7 @@ class Program {
       if (!uniform) continue;
       if (uniform.type === gl.FLOAT) gl.uniform1f(uniform.at, value);
       else if (uniform.type === gl.FLOAT_VEC2) gl.uniform2fv(uniform.at, value);
+      else if (uniform.type === gl.FLOAT_VEC4) gl.uniform4fv(uniform.at, value);
       else if (uniform.type === gl.FLOAT_VEC3) gl.uniform3fv(uniform.at, value);
       else if (uniform.type === gl.FLOAT_MAT3) gl.uniformMatrix3fv(uniform.at, true, value);
       else if (uniform.type === gl.UNSIGNED_INT) gl.uniform1ui(uniform.at, value);

@@ -172,7 +172,7 @@ class Viewer {
   readColours() {
     const style = getComputedStyle(document.documentElement);
     const colour = (name) => style.getPropertyValue(`--${name}`).trim();
-    const names = ["ground", "pane", "paint", "undefined", "seam", "halo"];
+    const names = ["ground", "pane", "paint", "undefined", "seam", "halo", "fold"];
     this.renderer.setColours(Object.fromEntries(names.map((name) => [name, rgb(expanded(colour(name)))])));
     this.accent = colour("accent");
   }

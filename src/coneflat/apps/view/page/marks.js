@@ -4,6 +4,7 @@ const RING = 11, CONE_RING = 15; // Radii in pixels; that of cones leaves the co
 const RING_SIZE = 14; // Pixels; smaller things are marked by a ring.
 const IN_FRONT = 0.03; // Model radii; a triangle hides a thing if it is nearer by at least this distance.
 const NAME_OFFSET = 20; // Distance in pixels of the name of a seam from it, more than a ring.
+const NAME_SPACE = [28, 16]; // Smallest distances in pixels of names side by side, and of names above each other.
 const NUMBER_INK = "#15181c", FONT = "600 14px system-ui, sans-serif";
 const UNSEEN = "rgba(0, 0, 0, 0.01)";
 
@@ -43,7 +44,7 @@ class Marks {
       if (picked) this.drawThing(pen, pane, state, picked, ink, true);
       if (hovered && !sameThing(hovered, picked)) this.drawThing(pen, pane, state, hovered, ink, hovered.kind === "seam");
       this.drawNumbers(pen, pane, state);
-      for (const {index} of seams) this.drawSeamName(pen, pane, state, index, ink);
+      for (const {index} of seams) this.drawSeamNames(pen, pane, state, index, ink);
       this.overlay?.(pen, pane);
       pen.restore();
     }
@@ -94,18 +95,22 @@ class Marks {
     pen.setLineDash([]);
   }
 
-  /** Write the name of the seam of an edge, if it has one, beside the middle of each of its sides. */
-  drawSeamName(pen, pane, state, edge, ink) {
-    const name = this.model.seamName(edge);
-    if (!name) return;
-    const middle = {kind: "seam", index: this.model.middleOfSeam(edge)};
-    if (!this.wasSeen(pane, middle, state)) return;
-    this.model.shapeOf(middle, pane.inPlane).forEach((ends, side) => {
-      const [x, y] = middleOf(ends.map((end) => pane.camera.project(end)));
-      const [inner, down] = pane.camera.project(this.model.oppositePlace(2 * middle.index + side, pane.inPlane));
-      const far = NAME_OFFSET / (Math.hypot(inner - x, down - y) || 1);
-      this.write(pen, name, [x + far * (inner - x), y + far * (down - y)], ink);
-    });
+  /** Write the names of the seam of an edge, if it has any, beside the middle of each of its sides; where they would cover each other, that of the edge comes first. */
+  drawSeamNames(pen, pane, state, edge, ink) {
+    const written = [];
+    for (const index of this.model.namedEdges(edge)) {
+      const middle = {kind: "seam", index};
+      if (!this.wasSeen(pane, middle, state)) continue;
+      this.model.shapeOf(middle, pane.inPlane).forEach((ends, side) => {
+        const [x, y] = middleOf(ends.map((end) => pane.camera.project(end)));
+        const [inner, down] = pane.camera.project(this.model.oppositePlace(2 * index + side, pane.inPlane));
+        const far = NAME_OFFSET / (Math.hypot(inner - x, down - y) || 1);
+        const place = [x + far * (inner - x), y + far * (down - y)];
+        if (written.some((other) => Math.abs(other[0] - place[0]) < NAME_SPACE[0] && Math.abs(other[1] - place[1]) < NAME_SPACE[1])) return;
+        written.push(place);
+        this.write(pen, this.model.nameAt(index), place, ink);
+      });
+    }
   }
 
   /** Write the numbers of pieces, if there are pieces. */

@@ -96,14 +96,31 @@ class Model {
     return this.seams[this.arrays.seam_numbers[edge]];
   }
 
-  /** Return the name of the seam of an edge; nothing if seams have no names. */
-  seamName(edge) {
-    return this.head.parts?.seam_names[this.arrays.seam_numbers[edge]];
+  /** Return the name at a seam edge, of its seam or of a part of it; nothing if seams have no names. */
+  nameAt(edge) {
+    return this.head.parts?.names[this.arrays.edge_names[edge]];
   }
 
-  /** Return of the edges of the seam of an edge the one nearest to their mean place on the model. */
+  /** Return an edge of each part of the seam of an edge that has a name: in the middle of the part, that of the edge first. */
+  namedEdges(edge) {
+    if (!this.head.parts) return [];
+    const parts = new Map([[this.nameAt(edge), []]]);
+    for (const index of this.edgesOfSeam(edge)) {
+      const name = this.nameAt(index);
+      if (!parts.has(name)) parts.set(name, []);
+      parts.get(name).push(index);
+    }
+    return Array.from(parts.values(), (edges) => this.middleOf(edges));
+  }
+
+  /** Return the edge in the middle of the seam of an edge. */
   middleOfSeam(edge) {
-    const edges = this.edgesOfSeam(edge), places = edges.map((index) => middleOf(this.shapeOf({kind: "seam", index}, false)[0]));
+    return this.middleOf(this.edgesOfSeam(edge));
+  }
+
+  /** Return of some seam edges the one nearest to their mean place on the model. */
+  middleOf(edges) {
+    const places = edges.map((index) => middleOf(this.shapeOf({kind: "seam", index}, false)[0]));
     const mean = middleOf(places), off = places.map((place) => Math.hypot(...place.map((x, k) => x - mean[k])));
     return edges[off.reduce((best, distance, i) => (distance < off[best] ? i : best), 0)];
   }

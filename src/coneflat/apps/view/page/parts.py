@@ -6,11 +6,27 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import connected_components
 
 from ....base import FloatArray, IntArray
 from ....mesh import end_corners
+
+
+@dataclass(frozen=True, eq=False)
+class FoldLines:
+    """Lines along which the pieces of a layout are folded.
+
+    Attributes:
+        places: (f, 2, 3) their ends on the model.
+        uv: (f, 2, 2) their ends in the layout.
+        is_mountain: (f,) whether they are folded away from the eye, not towards it.
+    """
+
+    places: FloatArray
+    uv: FloatArray
+    is_mountain: NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,19 +37,23 @@ class PageParts:
         pieces: (m,) the piece of each triangle, from 0; their numbers on the page begin with 1.
         anchors: of each piece, a triangle in the middle, on which its number is shown.
         seams: (k,) the seam of each seam edge, in the order of the edges of the mesh.
-        seam_names: the name of each seam.
         seam_texts: what is said of each seam, such as its length.
+        names: what is written at seams: a name of each seam, or of each of its parts.
+        edge_names: (k,) the name of each seam edge, an index into `names`.
         strain: (m,) relative change of the length of the side of each triangle that changes most, at true scale.
         strain_title: what these are, for the colour scale.
+        folds: lines along which the pieces are folded.
     """
 
     pieces: IntArray
     anchors: IntArray
     seams: IntArray
-    seam_names: Sequence[str]
     seam_texts: Sequence[str]
+    names: Sequence[str]
+    edge_names: IntArray
     strain: FloatArray
     strain_title: str
+    folds: FoldLines
 
 
 def seam_numbers(outline: IntArray, seam_edges: int, faces: IntArray) -> IntArray:

@@ -99,6 +99,8 @@ def head_and_block(
         arrays["picture"] = np.frombuffer(picture.content, dtype=np.uint8)
     if own_uv is not None and result.face_corners is not None:
         arrays["own_uv"] = own_uv[result.face_corners[content.face_numbers]].astype("f4")
+    if parts is not None:
+        arrays |= _arrays_of_parts(parts, content)
     titles = TITLES if quantity is None else {**TITLES, "own": quantity.label}
     titles = titles if parts is None else {**titles, "strain": parts.strain_title}
     listed, block = pack(arrays)
@@ -130,7 +132,12 @@ def head_and_block(
         "from_file": is_from_file(result),
         "parts": None
         if parts is None
-        else {"seam_names": list(parts.seam_names), "seam_texts": list(parts.seam_texts)},
+        else {
+            "seam_texts": list(parts.seam_texts),
+            "names": list(parts.names),
+            "folds": len(parts.folds.is_mountain),
+            "mountains": int(parts.folds.is_mountain.sum()),
+        },
         "arrays": listed,
     }
     return head, block
@@ -182,6 +189,18 @@ def _arrays(content: Content) -> dict[str, NDArray[Any]]:
     if content.left_out:
         arrays["face_numbers"] = content.face_numbers.astype("u4")
     return arrays
+
+
+def _arrays_of_parts(parts: PageParts, content: Content) -> dict[str, NDArray[Any]]:
+    """Return the names of seam edges, and the ends of folds: those of mountains first."""
+    folds = parts.folds
+    order = np.argsort(~folds.is_mountain, kind="stable")
+    places = (folds.places[order] - content.model.centre) / content.model.radius
+    return {
+        "edge_names": parts.edge_names.astype("u4"),
+        "fold_places": places.astype("f4"),
+        "fold_uv": folds.uv[order].astype("f4"),
+    }
 
 
 def _rounded(values: NDArray[np.float32]) -> NDArray[np.float32]:

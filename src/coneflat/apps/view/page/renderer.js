@@ -2,6 +2,7 @@
 
 const DARK_CELL = [0.4, 0.53, 0.7]; // Factor of the colour in dark squares: blue, so that red and black dots are visible.
 const SEAM_CORE = 1, SEAM_RADIUS = 2.2; // pixels
+const DASHES = [[10, 4, 2, 4], [7, 4, 7, 4]]; // Dashes and gaps of folds in pixels: of mountains, and of valleys.
 const PICK_RADII = [5, 1.5]; // Things under the pointer have priority over things near it.
 const SAMPLES = 4; // Samples per pixel, for smooth outlines.
 const ROUGH = 0.5; // Fraction of the pixels along a side while the view moves on a slow machine.
@@ -89,6 +90,7 @@ class Renderer {
 
   prepareLayout() {
     this.lines = [false, true].map((inPlane) => this.quads(outlineLines(this.model, inPlane)));
+    this.folds = [false, true].map((inPlane) => [true, false].map((areMountains) => this.quads(foldLines(this.model, inPlane, areMountains))));
     this.dots = [false, true].map((inPlane) => this.quads(coneDots(this.model, inPlane)));
   }
 
@@ -98,7 +100,7 @@ class Renderer {
     this.model = model;
     this.shown = null;
     this.targets.forEach((target) => (target.key = null));
-    [...this.lines, ...this.dots].forEach((shape) => shape.discard());
+    [...this.lines, ...this.folds.flat(), ...this.dots].forEach((shape) => shape.discard());
     if (isSame) {
       this.surface.refill(1, cornerUVs(model));
       this.putOwnUVs();
@@ -122,7 +124,7 @@ class Renderer {
     this.picture = pictureTexture(this.gl, source, asInFile);
   }
 
-  /** colours: {ground, pane, paint, undefined, seam, halo}, each three numbers. */
+  /** colours: {ground, pane, paint, undefined, seam, halo, fold}, each three numbers. */
   setColours(colours) {
     this.look.colours = colours;
   }
@@ -209,16 +211,25 @@ class Renderer {
       // All halos are drawn before all lines, because a halo would interrupt an earlier line.
       for (const [ink, strength, radius, lift] of [[colours.halo, 0.7, SEAM_RADIUS, 3], [colours.seam, 1, SEAM_CORE, 3.5]]) {
         const widths = {radius: (radius + 0.5) * pixel + 0.5, lift: lift * pixel};
-        this.programs.line.use({...view, ...widths, ink, strength});
+        this.programs.line.use({...view, ...widths, ink, strength, dashes: [0, 0, 0, 0]});
         this.lines[side].draw();
       }
     }
     if (state.get("cones")) {
+      this.drawFolds(view, side, pixel);
       this.programs.dot.use({...view, pixel});
       this.dots[side].draw();
     }
     gl.depthMask(true);
     gl.disable(gl.BLEND);
+  }
+
+  drawFolds(view, side, pixel) {
+    const widths = {radius: (SEAM_CORE + 0.5) * pixel + 0.5, lift: 3.2 * pixel};
+    this.folds[side].forEach((lines, kind) => {
+      this.programs.line.use({...view, ...widths, ink: this.look.colours.fold, strength: 1, dashes: DASHES[kind].map((length) => length * pixel)});
+      lines.draw();
+    });
   }
 
   /** Draw the picture, faded, in the unit square behind the layout. */

@@ -181,7 +181,13 @@ flat in float length_;
 out vec4 colour;
 uniform float radius, strength;
 uniform vec3 ink;
+uniform vec4 dashes;  // A dash, a gap, a dash and a gap, device pixels, from the middle of the first dash; 0 for solid lines.
 void main() {
+  float period = dashes.x + dashes.y + dashes.z + dashes.w;
+  if (period > 0.0) {
+    float at = mod(off.x - 0.5 * length_ + 0.5 * dashes.x, period) - dashes.x;
+    if ((at > 0.0 && at < dashes.y) || at > dashes.y + dashes.z) discard;
+  }
   float away = length(vec2(max(max(-off.x, off.x - length_), 0.0), off.y));
   float inside = 1.0 - smoothstep(radius - 1.5, radius - 0.5, away);
   if (inside < 0.02) discard;
