@@ -8,6 +8,7 @@ import numpy as np
 
 from coneflat import Pattern, TriangleMesh
 from coneflat.apps.patterns.pieces.cut_surface import CutSurface
+from coneflat.geometry import signed_double_areas
 
 
 def sheet(width: float = 120.0, height: float = 80.0, columns: int = 6, rows: int = 4) -> CutSurface:
@@ -83,3 +84,12 @@ def gores(count: int = 8, rows: int = 12, radius: float = 40.0, kind: str = "gor
                         corners.append([point(gore, *quad[k]) for k in chosen])
     mesh = TriangleMesh(radius * np.array(vertices), np.array(faces))
     return Pattern(kind, CutSurface(mesh, np.array(corners), radius * np.array(flat)), 1.0, settings=settings)
+
+
+def assert_lawful(pattern: Pattern) -> None:
+    """Assert what holds for every pattern: no flipped or overlapping triangles, and sides of seams equally long."""
+    surface = pattern.surface
+    assert (signed_double_areas(surface.places) > 0).all()
+    assert not len(surface.overlaps())
+    lengths = np.array([seam.lengths for seam in pattern.seams]).reshape(-1, 2)
+    assert np.abs(lengths[:, 0] - lengths[:, 1]).max(initial=0.0) < 1e-6

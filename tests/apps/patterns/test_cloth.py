@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import shapes
+from flat_pieces import assert_lawful
 from scipy.spatial import cKDTree
 
 import coneflat
@@ -112,6 +113,7 @@ def test_both_sides_of_seams_become_equally_long():
 
 
 def test_cloth_is_within_its_strain_without_overlaps(ball):
+    assert_lawful(ball[1])
     _, result = ball
     assert np.abs(result.strains).max() <= 0.08
     assert result.notes == ()

@@ -221,6 +221,9 @@ def test_the_command_writes_a_net(tmp_path):
     assert "pieces" in made.stdout
     cut = lines_of_svg(tmp_path / "cube.svg")["cut"]
     assert len(cut) == 1
+    twice = command(*words, "-o", "cube.svg", "-o", "./cube.svg", cwd=tmp_path)
+    assert twice.returncode == 2
+    assert "cube.svg is both the output 1 and the output 2" in twice.stderr
     failed = command(*words, "--require", "pieces>=2", "-o", "cube.dxf", cwd=tmp_path)
     assert failed.returncode == 3
     assert "pieces is 1, but pieces>=2 is required" in failed.stderr

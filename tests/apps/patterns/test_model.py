@@ -70,3 +70,49 @@ def test_strain_of_gores_that_materials_do_not_have_is_noted():
 )
 def test_percentages_have_no_exponents(strain, text):
     assert percentage(strain) == text
+
+
+def with_flat_triangle_at_the_border():
+    """A grid of 4 x 3 units, with a triangle without area on a border edge that reaches 10 units high."""
+    vertices, faces = FLAT
+    edge = coneflat.check_mesh(vertices, faces).mesh
+    tail, head = edge.edges[edge.is_boundary_edge & (vertices[edge.edges][:, :, 1] == 0).all(axis=1)][0]
+    along = vertices[head] - vertices[tail]
+    tip = vertices[head] + 5 * along
+    return np.vstack([vertices, tip]), np.vstack([faces, [head, tail, len(vertices)]])
+
+
+@pytest.mark.parametrize("kind", ["cloth", "sheet", "net"])
+def test_triangles_without_area_at_the_border_do_not_count(kind):
+    result = coneflat.pattern(*with_flat_triangle_at_the_border(), kind=kind, height=100.0, axis=(1, 0, 0))
+    plain = coneflat.pattern(*FLAT, kind=kind, height=100.0, axis=(1, 0, 0))
+    assert "Left out 1 triangle without area at the border." in result.notes
+    extents = [np.ptp(pattern.surface.mesh.vertices, axis=0) for pattern in (result, plain)]
+    assert extents[0] == pytest.approx(extents[1])
+
+
+def test_a_seam_along_a_triangle_without_area_continues_along_its_short_sides():
+    corners = np.array([[0, 0, 0], [2, 0, 0], [2, 2, 0], [0, 2, 0], [1, 1, 0.0]])
+    faces = [[0, 1, 2], [0, 2, 4], [0, 4, 3], [4, 2, 3]]
+    result = coneflat.pattern(corners, faces, unit="mm", seams=[[0, 2]])
+    cut = result.surface.mesh.edges[result.surface.seams].tolist()
+    assert sorted(cut) == [[0, 4], [2, 4]]
+    assert result.piece_count == 2
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"height": 10**400}, "height must be a length"),
+        ({"strain": 10**400}, "strain must be from 0.01 % to 100 %"),
+        ({"strain": 1e-12}, "strain must be from 0.01 % to 100 %"),
+    ],
+)
+def test_numbers_beyond_reason_are_errors(options, message):
+    with pytest.raises(OptionError, match=message):
+        coneflat.pattern(*sphere(1), **{"unit": "mm", **options} if "height" not in options else options)
+
+
+def test_allowances_of_single_seams_exclude_tabs():
+    with pytest.raises(OptionError, match="seam_allowances and tabs of a net cannot be combined"):
+        coneflat.pattern(*sphere(1), kind="net", unit="mm", seam_allowances="A=5mm")

@@ -57,7 +57,7 @@ def pattern(
       coneflat pattern toy.stl --height 300mm --view toy.html
     """
     from ... import pattern as make_pattern
-    from ...io import check_target, read_joined
+    from ...io import PIPE, check_target, read_joined
     from ...measures import parse_requirements
     from ...options import read_options
     from ..patterns import PATTERN_MEASURES, check_pattern_output, page_of_pattern, rows_of
@@ -66,7 +66,8 @@ def pattern(
 
     flags, options = pop_flags(params, PatternFlags), keywords(params, PatternOptions)
     read_options(options, PatternOptions)
-    outputs = flags.output or (() if flags.view else (Path(f"{mesh.stem}.pdf"),))
+    name = "pattern" if mesh == PIPE else mesh.stem
+    outputs = flags.output or (() if flags.view else (Path(f"{name}.pdf"),))
     for path in outputs:
         check_pattern_output(path)
     if flags.view is not None:
@@ -74,7 +75,7 @@ def pattern(
     if flags.report is not None:
         check_target(flags.report)
     files = {"input": mesh, "view": flags.view, "report": flags.report}
-    require_distinct({**files, **{str(path): path for path in outputs}})
+    require_distinct({**files, **{f"output {i + 1}": path for i, path in enumerate(outputs)}})
     requirements = parse_requirements(required, PATTERN_MEASURES)
     with Console(verbosity) as console:
         with console.stage("read", 0.0):

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ... import TriangleMesh, check_mesh
-from ...base import FloatArray, IntArray, plural
+from ...base import FloatArray, IntArray
 from ...errors import OptionError
 from ...io import as_input
 from ...mesh import CheckedMesh
@@ -58,12 +58,15 @@ def read_model(mesh: Any, faces: ArrayLike | None, options: PatternOptions) -> M
     """
     source = as_input(mesh, faces)
     checked = check_mesh(source.vertices, source.faces, repair=options.repair)
-    vertices = checked.mesh.vertices
+    # Far from the origin, differences of coordinates would lose digits.
+    centred = checked.mesh.moved_to(checked.mesh.vertices - checked.mesh.vertices.mean(axis=0))
+    sound = without_degenerate(centred, _own_seams(source, checked, options))
+    vertices = sound.mesh.vertices
     ending = "" if source.source is None else source.source.path.suffix.lower()
     if options.axis is not None:
         axis = np.array(options.axis) / np.linalg.norm(options.axis)
     else:
-        axis = _guessed_axis(vertices, checked.mesh.faces, ending)
+        axis = _guessed_axis(vertices, sound.mesh.faces, ending)
     factor, notes = _millimetres(vertices, axis, ending, options)
     extents = np.ptp(vertices, axis=0) * factor
     if extents.max() > LARGEST:
@@ -71,15 +74,8 @@ def read_model(mesh: Any, faces: ArrayLike | None, options: PatternOptions) -> M
             f"the model would be {text_of_size(extents)}, more than {LARGEST / 1e6:g} km: choose another unit, "
             "a smaller scale, or a height"
         )
-    # Far from the origin, differences of coordinates would lose digits.
-    centred = checked.mesh.moved_to((vertices - vertices.mean(axis=0)) * factor)
-    sound, replaced = without_degenerate(centred)
-    if replaced:
-        notes = (
-            *notes,
-            f"Replaced {plural(replaced, 'triangle')} without area by the other diagonal beside them.",
-        )
-    return Model(sound, axis, factor, _own_seams(source, checked, options), (*checked.notes, *notes))
+    scaled = sound.mesh.moved_to(vertices * factor)
+    return Model(scaled, axis, factor, sound.seams, (*checked.notes, *notes, *sound.notes()))
 
 
 def _guessed_axis(vertices: FloatArray, faces: IntArray, ending: str) -> FloatArray:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from ...errors import OptionError
 from ...options import Choice, Direction, Edges, Number, RunOptions, declarations, option
-from .finish import MAX_ALLOWANCE, Allowances
+from .finish import MAX_ALLOWANCE, Allowances, read_allowances
 from .papers import PaperName
 from .units import MILLIMETRES, Length, Percentage
 
@@ -86,8 +86,13 @@ class PatternOptions(RunOptions):
             raise OptionError(
                 "grain none and stretch_warp or stretch_weft cannot be combined: leave out one of them"
             )
-        if self.kind == "net" and self.allowance and self.tabs:
-            raise OptionError("allowance and tabs of a net cannot be combined: give 0 as one of them")
+        if self.kind == "net" and self.tabs:
+            for name, widths in (
+                ("allowance", [self.allowance or 0.0]),
+                ("seam_allowances", read_allowances(self.seam_allowances).values()),
+            ):
+                if any(widths):
+                    raise OptionError(f"{name} and tabs of a net cannot be combined: give 0 as one of them")
         if self.lengths is not None:
             raise OptionError("lengths and patterns cannot be combined: leave out lengths")
 

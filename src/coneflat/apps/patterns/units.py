@@ -48,14 +48,15 @@ class Length(Kind):
 
 @dataclass(frozen=True)
 class Percentage(Kind):
-    """A fraction above 0, or a text such as "3%".
+    """A fraction, or a text such as "3%".
 
     Attributes:
-        maximum: the largest fraction.
+        minimum, maximum: the smallest and the largest fraction.
         optional: None is allowed, also as the word "none".
     """
 
     metavar: ClassVar[str] = "PERCENT"
+    minimum: float = 1e-4
     maximum: float = 1.0
     optional: bool = False
 
@@ -63,9 +64,9 @@ class Percentage(Kind):
         if self.optional and (value is None or (isinstance(value, str) and value == "none")):
             return None
         fraction = _fraction(value)
-        if fraction is None or not 0 < fraction <= self.maximum:
+        if fraction is None or not self.minimum <= fraction <= self.maximum:
             raise OptionError(
-                f"{name} must be above 0 % and at most {100 * self.maximum:g} %, such as 3% or 0.03, got "
+                f"{name} must be from {100 * self.minimum:g} % to {100 * self.maximum:g} %, such as 3% or 0.03, got "
                 f"{short_repr(value)}"
             )
         return fraction
@@ -76,7 +77,7 @@ def length_of(value: Any) -> float | None:
     match = _LENGTH.fullmatch(value) if isinstance(value, str) else None
     try:
         number = float(match[1] if match else value) if match or not isinstance(value, str) else math.nan
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         return None
     length = number * MILLIMETRES[match[2] or "mm"] if match else number
     return length if math.isfinite(length) else None
@@ -90,7 +91,7 @@ def _fraction(value: Any) -> float | None:
     match = _PERCENT.fullmatch(value) if isinstance(value, str) else None
     try:
         number = float(match[1]) / 100 if match else float(value)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         return None
     return number if match or number < 1 else None
 

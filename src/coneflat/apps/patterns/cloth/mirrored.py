@@ -13,8 +13,9 @@ from ..pieces.cut_surface import CutSurface
 from ..pieces.strain import Stretch
 from .joining import with_joined_pieces
 
-# Largest component of the grain along the normal of the plane: the grain of mirror images would point elsewhere.
-IN_PLANE = 1e-6
+# Largest component of the grain along the normal of the plane, for axes that are typed with two or three digits: the
+# grain of mirror images points elsewhere by twice as much.
+IN_PLANE = 0.01
 
 
 @dataclass(frozen=True, eq=False)
