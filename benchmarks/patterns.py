@@ -46,7 +46,7 @@ def main() -> None:
     parser.add_argument("--models", default=",".join((*CLOTH_MADE, *CLOTH_MODELS)), help="of cloth")
     parser.add_argument("--net-models", default=",".join(NET_MODELS), help="decimated ones")
     parser.add_argument("--strains", default="10,5,3,1", help="percent")
-    parser.add_argument("--triangles", type=int, default=2000, help="models of cloth are decimated to")
+    parser.add_argument("--triangles", type=int, default=1500, help="models of cloth are decimated to")
     parser.add_argument("--net-triangles", type=int, default=1500, help="models of nets are decimated to")
     arguments = parser.parse_args()
     warnings.simplefilter("ignore", GuaranteeWarning)  # The tables say what is not met.

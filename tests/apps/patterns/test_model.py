@@ -66,7 +66,14 @@ def test_strain_of_gores_that_materials_do_not_have_is_noted():
 
 @pytest.mark.parametrize(
     ("strain", "text"),
-    [(2.4, "240 %"), (0.237, "24 %"), (0.0294, "2.9 %"), (0.00055, "0.055 %"), (12.3, "1,230 %")],
+    [
+        (2.4, "240 %"),
+        (5e-16, "0 %"),
+        (0.237, "24 %"),
+        (0.0294, "2.9 %"),
+        (0.00055, "0.055 %"),
+        (12.3, "1,230 %"),
+    ],
 )
 def test_percentages_have_no_exponents(strain, text):
     assert percentage(strain) == text

@@ -49,7 +49,8 @@ def pattern(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Patter
         MeshError, MeshFileError, SeamError, MetricError, TooLargeError: as for `coneflat.unwrap`.
 
     Warns:
-        GuaranteeWarning: a guarantee, or a request, is not met; notes of the result say which.
+        GuaranteeWarning: the strain is beyond its bound, or darts remain that are not wanted; notes of the result
+            say by how much.
 
     Examples:
         >>> result = coneflat.pattern(coneflat.sample_path(), height="200mm", strain="5%")

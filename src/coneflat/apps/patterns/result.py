@@ -39,7 +39,7 @@ class Pattern:
         folds: (f, 2) points of fold lines inside pieces, and `fold_angles` (f,) their dihedral angles in radians,
             positive for mountain folds, negative for valleys.
         tabs: tabs for glue, beside the pieces.
-        notes: what could not be met, one sentence each.
+        notes: what was changed, assumed, or could not be met.
         settings: the options.
 
     Examples:

@@ -14,6 +14,8 @@ from ...options import Kind
 
 #: Millimetres per unit.
 MILLIMETRES: Mapping[str, float] = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4}
+#: Strain below which a pattern is exact: 1 um of 1 m, far above rounding.
+EXACT_STRAIN = 1e-6
 _LENGTH = re.compile(r"\s*([0-9.]+(?:[eE][-+]?[0-9]+)?)\s*(mm|cm|m|in|)\s*")
 _PERCENT = re.compile(r"\s*([0-9.]+(?:[eE][-+]?[0-9]+)?)\s*%\s*")
 
@@ -111,7 +113,9 @@ def text_of_direction(direction: Any) -> str:
 
 
 def percentage(strain: float) -> str:
-    """Return a strain in per cent, with two digits or more."""
+    """Return a strain in per cent, with two digits or more; 0 % if no one could measure it."""
+    if abs(strain) < EXACT_STRAIN:
+        return "0 %"
     return f"{100 * strain:,.0f} %" if abs(strain) >= 0.1 else f"{100 * strain:.2g} %"
 
 
