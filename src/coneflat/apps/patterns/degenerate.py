@@ -113,12 +113,12 @@ def _with_replaced(sound: SoundMesh, is_flat: BoolArray) -> SoundMesh:
 def _without_lone_vertices(sound: SoundMesh) -> SoundMesh:
     """Return a mesh without vertices and seams that no triangle has any more."""
     mesh, seams = sound.mesh, sound.seams
-    used = np.unique(mesh.faces)
+    members = np.unique(mesh.faces)
     number = np.full(len(mesh.vertices), -1)
-    number[used] = np.arange(len(used))
+    number[members] = np.arange(len(members))
     if seams is not None:
         seams = number[seams]
         seams = seams[(seams >= 0).all(axis=1)]
     return SoundMesh(
-        TriangleMesh(mesh.vertices[used], number[mesh.faces]), seams, sound.flipped, sound.removed
+        TriangleMesh(mesh.vertices[members], number[mesh.faces]), seams, sound.flipped, sound.removed
     )

@@ -31,7 +31,8 @@ def develop_sheet(mesh: TriangleMesh) -> Development:
     """Return a piece for each component of a surface, with as few cuts as possible and little strain.
 
     A piece that would overlap itself is divided. Developable surfaces are exact. If the curvature of a surface is in a
-    few corners, such as those of a box without lid, it is cut from there to its border, and exact. Other curvature remains as strain. Bends: `find_bends`.
+    few corners, such as those of a box without lid, it is cut from there to its border, and exact. Other curvature
+    remains as strain. Bends: `find_bends`.
 
     Args:
         mesh: a mesh of one side of the sheet; closed surfaces are cut.
