@@ -100,7 +100,12 @@ def _table(group: type, noun: str, rows: list[tuple[str, ...]], spelled: Callabl
     for row in rows:
         assert not any("|" in cell for cell in row), row
         lines.append(f"| {' | '.join(row)} |".replace("  ", " "))
-    shared = [name for name, declaration in declarations(group).items() if _is_shared(declaration, group)]
+    refused = getattr(group, "REFUSED", ())
+    shared = [
+        name
+        for name, declaration in declarations(group).items()
+        if _is_shared(declaration, group) and name not in refused
+    ]
     if shared:
         lines += ["", f"As for `flatten`: {', '.join(filter(None, map(spelled, shared)))}."]
     names = [name for name, declaration in declarations(group).items() if declaration.only == "sparse"]

@@ -6,6 +6,7 @@ import shapely
 from polyhedra import cube, icosphere, turned, uv_sphere
 from shapes import renumber, rotation, torus
 
+import coneflat
 from coneflat import check_mesh
 from coneflat.apps.patterns.drawing.shapes import tails
 from coneflat.apps.patterns.gores.gores import cut_gores
@@ -153,3 +154,18 @@ def test_gores_do_not_depend_on_numbers_motion_or_scale():
 def test_a_ring_has_no_gores(axis):
     with pytest.raises(MeshError, match=r"strip \d of 8 (is not a disk|consists of 2 pieces)"):
         cut_gores(check_mesh(*torus()).mesh, 8, np.array(axis, dtype=float))
+
+
+def test_the_axis_is_that_of_least_strain_unless_it_is_given():
+    ball = uv_sphere(24, 12)
+    bottle = ball.moved_to(ball.vertices * [1, 1, 2] * (1 + 0.2 * ball.vertices[:, 2:]))
+    for turns in range(3):
+        moved = bottle.moved_to(np.roll(bottle.vertices, turns, axis=1))
+        result = coneflat.pattern(moved.vertices, moved.faces, kind="gores", gores=8, height=100.0)
+        assert result.settings["axis"] == tuple(np.roll([0.0, 0.0, 1.0], turns))
+        assert np.ptp(result.surface.mesh.vertices, axis=0)[(2 + turns) % 3] == pytest.approx(100)
+    assert coneflat.pattern(bottle, kind="gores", gores=8, height=100.0, axis=(0, 1, 0)).settings["axis"] == (
+        0,
+        1,
+        0,
+    )

@@ -62,6 +62,8 @@ def without_degenerate(mesh: TriangleMesh, seams: IntArray | None = None) -> Sou
         is_flat = _is_degenerate(sound.mesh.vertices, sound.mesh.faces)
         if not is_flat.any():
             return _without_lone_vertices(sound) if sound.removed else sound
+        if is_flat.all():
+            raise DegenerateFaceError("the mesh has no area: all of its triangles are degenerate")
         sound = _with_replaced(sound, is_flat)
     raise DegenerateFaceError(
         f"{int(is_flat.sum()):,} triangles without area could not be replaced: merge vertices at the same places first"

@@ -14,7 +14,7 @@ from ...options import read_options, settings, takes
 from .cloth.cloth import cloth_pieces
 from .drawing.gaps import notes_on_gaps
 from .finish import Finish
-from .gores.gores import cut_gores
+from .gores.gores import best_axis, cut_gores
 from .model import Model, read_model
 from .net.net import unfold_net
 from .net.tabs import glue_tabs
@@ -27,7 +27,7 @@ from .result import Pattern
 from .sheet.sheet import develop_sheet
 
 # Fractions of the work that are done after checking the mesh and after cutting it.
-CHECKED, CUT = 0.02, 0.95
+CHECKED, AXIS_FOUND, CUT = 0.02, 0.6, 0.95
 
 
 @takes(PatternOptions)
@@ -61,6 +61,10 @@ def pattern(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Patter
     with timing(parsed.progress) as stages, component_at_work("", 1.0):
         with stages("check", CHECKED):
             model = read_model(mesh, faces, parsed)
+        if parsed.kind == "gores" and parsed.axis is None:
+            with stages("axis", AXIS_FOUND):
+                parsed = replace(parsed, axis=best_axis(model.mesh, parsed.gores, model.axis))
+                model = read_model(mesh, faces, parsed)
         with stages("cut", CUT):
             developed = _METHODS[parsed.kind](model, parsed)
         with stages("pack", 1.0):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 from ...errors import OptionError
 from ...options import Choice, Direction, Edges, Number, RunOptions, declarations, option
@@ -45,7 +45,7 @@ class PatternOptions(RunOptions):
             dense meshes are simplified; 0 for neither.
         gores: Number of strips from pole to pole.
         axis: Upward direction of the model, along which its height and the poles of gores are; by default that of
-            its format, or of its shape.
+            its format, or of its shape; for gores the coordinate axis around which they have the least strain.
         grain: Direction on the model along which the grain of cloth and gores is; by default the axis. none: pieces
             have no grain, and are rotated to save material.
         allowance: Width of the seam allowance: 7 mm for cloth and gores by default, else 0.
@@ -55,6 +55,9 @@ class PatternOptions(RunOptions):
         page: Paper of a PDF: a page size, onto which the pattern is tiled; roll:WIDTH; or none for one page as large as
             the pattern.
     """
+
+    #: Options of the group that patterns refuse.
+    REFUSED: ClassVar = ("lengths",)
 
     kind: str = option("cloth", Choice(KINDS))
     unit: str | None = option(None, Choice((*MILLIMETRES,)))
@@ -93,8 +96,9 @@ class PatternOptions(RunOptions):
             ):
                 if any(widths):
                     raise OptionError(f"{name} and tabs of a net cannot be combined: give 0 as one of them")
-        if self.lengths is not None:
-            raise OptionError("lengths and patterns cannot be combined: leave out lengths")
+        for name in self.REFUSED:
+            if getattr(self, name) is not None:
+                raise OptionError(f"{name} and patterns cannot be combined: leave out {name}")
 
 
 def _differs(value: object, default: object) -> bool:

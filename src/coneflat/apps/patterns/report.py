@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from ...measures import quantile
 from .drawing.allowances import shapely
 from .drawing.shapes import piece_shapes
 from .finish import Finish
@@ -17,6 +18,7 @@ from .units import percentage, text_of_size
 #: Numbers of the report, which `--require` takes.
 PATTERN_MEASURES = (
     "pieces", "seams", "darts", "corner_cuts", "eased_seams", "ease_max", "seam_length", "strain_max", "strain_mean",
+    "stretch_max", "stretch_p95", "short_seams", "piece_area_min",
     "area", "sheet_width", "sheet_height", "sheet_share", "pages", "millimetres_per_unit",
 )  # fmt: skip
 
@@ -29,6 +31,7 @@ def report_of(pattern: Pattern) -> dict[str, Any]:
     width, height = (shapely().total_bounds(cut)[2:] + EDGE).tolist()
     paper = Paper.of(pattern.settings.get("page", "A4"))
     strains, lengths = np.abs(pattern.strains), pattern.surface.edges.lengths
+    stretches = np.abs(pattern.stretches)
     seams = [
         {
             "name": seam.name,
@@ -54,6 +57,10 @@ def report_of(pattern: Pattern) -> dict[str, Any]:
         "seam_length": pattern.surface.seam_length,
         "strain_max": float(strains.max()),
         "strain_mean": float(np.average(strains, weights=lengths)),
+        "stretch_max": float(stretches.max()),
+        "stretch_p95": quantile(stretches, pattern.surface.edges.double_areas, 0.95),
+        "short_seams": sum(min(seam.lengths) < finish.width(seam.name) for seam in pattern.seams),
+        "piece_area_min": min(shape.inside.area for shape in shapes),
         "area": area,
         "sheet_width": width,
         "sheet_height": height,
@@ -100,11 +107,16 @@ def rows_of(pattern: Pattern, report: dict[str, Any] | None = None) -> list[tupl
         (
             "seams",
             f"{report['seams'] - report['darts'] - report['corner_cuts']}",
-            eased if report["eased_seams"] else "sides equally long",
+            eased if report["eased_seams"] else "sides equally long" if report["seams"] else "",
         ),
         (noun, f"{report['darts'] + report['corner_cuts']}", "cuts that end inside a piece"),
         ("seam length", f"{report['seam_length']:.0f} mm", "on the model, darts included"),
         ("strain", percentage(report["strain_max"]), "largest relative change of the length of an edge"),
+        (
+            "stretch",
+            percentage(report["stretch_p95"]),
+            "in any direction inside triangles, 95 % of the area less",
+        ),
         (
             "sheet",
             f"{report['sheet_width']:.0f} x {report['sheet_height']:.0f} mm",

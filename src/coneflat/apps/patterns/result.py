@@ -11,13 +11,13 @@ from typing import Any
 
 import numpy as np
 
-from ...base import EntryPoint, FloatArray, IntArray
+from ...base import EntryPoint, FloatArray, IntArray, plural
 from .drawing.counterparts import Counterparts
 from .drawing.drawing import Drawing
 from .finish import SEWN
 from .net.tabs import Tab
 from .pieces.borders import Borders, Seam, find_borders
-from .pieces.cut_surface import CutSurface
+from .pieces.cut_surface import CutSurface, largest_stretches
 from .sheet.bends import Bend, find_bends
 
 _DRAWING = EntryPoint[Drawing]("apps.patterns.drawing.outlines:drawing_of")
@@ -108,6 +108,20 @@ class Pattern:
     def strains(self) -> FloatArray:
         """(k,) the relative change of length of each edge of the pieces, `surface.edges`."""
         return self.surface.edges.strains(self.surface.points)
+
+    @cached_property
+    def stretches(self) -> FloatArray:
+        """(m,) the relative change of length of each triangle in the direction in which it is largest.
+
+        It can exceed those of the edges, where cloth is sheared.
+        """
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return largest_stretches(self.surface)
+
+    def __repr__(self) -> str:
+        size = " x ".join(f"{extent:.3g}" for extent in np.ptp(self.surface.mesh.vertices, axis=0))
+        counts = f"{plural(self.piece_count, 'piece')}, {plural(len(self.seams), 'seam')}"
+        return f"<Pattern ({self.kind}): {counts}, {size} mm>"
 
     def drawing(self) -> Drawing:
         """Return the drawing: what is cut, folded and marked, with numbers and names, at its true size.

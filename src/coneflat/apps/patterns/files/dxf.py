@@ -52,8 +52,13 @@ def dxf_of(drawing: Drawing) -> Any:
         _add_line(document, space, line, names)
     for text in drawing.texts:
         _add_text(space, text)
-    document.header["$EXTMIN"] = (0.0, 0.0, 0.0)
-    document.header["$EXTMAX"] = (drawing.width, drawing.height, 0.0)
+    # When the document is written, the header gets the values of the space, but not those of the origin.
+    document.header["$EXTMIN"], document.header["$EXTMAX"] = (
+        (0.0, 0.0, 0.0),
+        (drawing.width, drawing.height, 0.0),
+    )
+    space.reset_extents((0.0, 0.0, 0.0), (drawing.width, drawing.height, 0.0))
+    space.reset_limits((0.0, 0.0), (drawing.width, drawing.height))
     document.set_modelspace_vport(height=drawing.height, center=(drawing.width / 2, drawing.height / 2))
     return document
 

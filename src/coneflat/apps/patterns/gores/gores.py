@@ -21,6 +21,8 @@ from .half_planes import AroundAxis
 # Digits of radii and keys by which the vertex of the first half-plane is chosen: rounding errors are smaller.
 DIGITS = 7
 
+# Strain of gores around the upward axis, relative to that around another one, up to which the upward one is taken.
+MUCH_LESS = 1.1
 # Strain above which a note says so: cloth, paper and sheets are rarely stretched by more.
 NOTED_STRAIN = 0.05
 # Difference of the heights of the two ends of a strip, relative to the extent, up to which neither is the upper one.
@@ -52,6 +54,40 @@ def cut_gores(mesh: TriangleMesh, count: int, axis: FloatArray) -> Development:
     flat = least_strained(_laid_out(flat))
     notes = tuple(_notes_on_strain(flat, strips))
     return Development(replace(flat, points=_upright(flat, strips)), notes=notes)
+
+
+def best_axis(mesh: TriangleMesh, count: int, upward: FloatArray) -> tuple[float, float, float]:
+    """Return the axis of a surface around which gores have the least strain: a coordinate axis.
+
+    Args:
+        mesh: the surface.
+        count: the number of strips.
+        upward: (3,) the axis that is taken unless another one has much less strain.
+
+    Raises:
+        MeshError: there are no gores around any of them; the error is that of the upward one.
+    """
+    axes = sorted(
+        ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)), key=lambda axis: -abs(float(upward @ axis))
+    )
+    outcomes = [_largest_strain(mesh, count, axis) for axis in axes]
+    strains = [outcome if isinstance(outcome, float) else np.inf for outcome in outcomes]
+    if isinstance(outcomes[0], Exception) and min(strains) == np.inf:
+        raise outcomes[0]
+    return next(
+        axis for axis, strain in zip(axes, strains, strict=True) if strain <= MUCH_LESS * min(strains)
+    )
+
+
+def _largest_strain(
+    mesh: TriangleMesh, count: int, axis: tuple[float, float, float]
+) -> float | MeshError | MetricError:
+    """Return the largest strain of gores around an axis, or the error if there are none."""
+    try:
+        surface = cut_gores(mesh, count, np.array(axis)).surface
+    except (MeshError, MetricError) as error:
+        return error
+    return float(np.abs(surface.edges.strains(surface.points)).max())
 
 
 def _notes_on_strain(flat: CutSurface, strips: _Strips) -> Iterator[str]:

@@ -10,6 +10,7 @@ import numpy as np
 from .... import Flattening, TriangleMesh
 from ....base import BoolArray, FloatArray, IntArray, mask_of
 from ....geometry import double_areas, edge_lengths, find_overlaps
+from ....measures import measure_map
 from ....mesh import label_faces, open_along, point_seams, point_vertices
 from .numbering import order_by_size
 from .strain import FlatEdges
@@ -130,3 +131,11 @@ def lengths_of_edges(mesh: TriangleMesh) -> FloatArray:
     """Return (e,) the lengths of the edges of a mesh."""
     ends = mesh.vertices[mesh.edges]
     return np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+
+
+def largest_stretches(surface: CutSurface) -> FloatArray:
+    """Return (m,) of both singular values of the map of each triangle, minus 1, the one of larger absolute value."""
+    measured = measure_map(surface.mesh, surface.places)
+    scale, root = np.exp(measured.log_area_scale), np.sqrt(measured.qc)
+    changes = np.stack([scale * root - 1, scale / root - 1])
+    return changes[np.abs(changes).argmax(axis=0), np.arange(len(scale))]
