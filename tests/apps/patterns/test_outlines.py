@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
 import polyhedra
 import pytest
+import shapes
 from flat_pieces import gores, sheet, two_pieces, with_dart
 
 import coneflat
@@ -210,6 +212,15 @@ def test_no_text_covers_another_and_names_are_inside(count):
     assert all(any(piece.contains(box) for piece in cut) for box in boxes)
     names = [text.text.split()[0] for text in drawing.texts if "(" in text.text]
     assert all(names.count(seam.name) == 2 for seam in pattern.seams)
+
+
+def test_both_sides_of_every_seam_have_a_name_however_small_the_pattern_is():
+    result = coneflat.pattern(*shapes.sphere(3), height=40, strain=0.03)
+    drawing = result.drawing()
+    names = Counter(text.text.removeprefix("dart ").split(" ")[0] for text in drawing.texts)
+    assert min(seam.lengths[0] for seam in result.seams) < 5
+    assert [seam.name for seam in result.seams if names[seam.name] < 2] == []
+    assert drawing.notes == ()
 
 
 def test_straight_parts_of_seams_of_nets_have_names_of_their_own():

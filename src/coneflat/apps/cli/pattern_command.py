@@ -90,7 +90,7 @@ def pattern(
         report = result.report()
         if flags.report is not None:
             write_report(flags.report, {**report, "seconds": dict(console.seconds)})
-        console.notes(joined.all_notes(result.notes))
+        console.notes(joined.all_notes(tuple(report["notes"])))
         written = [*outputs, *(path for path in (flags.view, flags.report) if path is not None)]
         console.finish(written)
         console.table(rows_of(result, report))

@@ -79,7 +79,7 @@ def report_of(pattern: Pattern) -> dict[str, Any]:
             for i, (piece_width, piece_height, piece_area) in enumerate(piece_sizes(pattern))
         ],
         "each_seam": seams,
-        "notes": list(pattern.notes),
+        "notes": [*pattern.notes, *pattern.drawing().notes],
         "settings": dict(pattern.settings),
     }
 

@@ -53,12 +53,17 @@ class Text:
 
 @dataclass(frozen=True, eq=False)
 class Drawing:
-    """Lines and texts on a sheet from (0, 0) to (width, height), mm, y upward."""
+    """Lines and texts on a sheet from (0, 0) to (width, height), mm, y upward.
+
+    Attributes:
+        notes: what had no room, one sentence each.
+    """
 
     width: float
     height: float
     lines: tuple[Line, ...]
     texts: tuple[Text, ...] = ()
+    notes: tuple[str, ...] = ()
 
     def with_marks(self, lines: Sequence[Line], texts: Sequence[Text] = ()) -> Drawing:
         """Return the drawing with more lines and texts."""

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ....base import FloatArray, IntArray
+from ....base import FloatArray, IntArray, list_some
 from ..finish import HEM, Finish
 from ..pages.tiling import tiles_of
 from ..papers import EDGE, Paper
@@ -56,14 +56,22 @@ def drawing_of(pattern: Pattern) -> Drawing:
         lines += add_number(room, rooms.outside, piece, shapes[piece].inside.area, pages)
         if pattern.has_grain:
             lines += add_grain(room)
+    unnamed = list[str]()
     for seam in sorted(pattern.seams, key=lambda seam: -min(seam.lengths)):
         for name in names_of(pattern.kind, seam, points, is_single=pattern.piece_count == 1):
-            add_seam_name(rooms.at(name.piece), name.text, name.line, finish.width(seam.name))
+            leaders = add_seam_name(rooms.at(name.piece), name.text, name.line, finish.width(seam.name))
+            lines += leaders or []
+            unnamed += [f"{name.text} of piece {name.piece + 1}"] if leaders is None else []
     for ends, angle in zip(pattern.folds, pattern.fold_angles, strict=True):
         add_angle(rooms.inside[piece_of_point[ends[0]]], points[ends], float(angle))
     for bend in pattern.bends:
         add_angle(rooms.inside[bend.piece], bend.line, bend.angle, bend.radius)
-    return Drawing(float(width), float(height), tuple(lines), tuple(rooms.texts()))
+    notes = (
+        ()
+        if not unnamed
+        else (f"no room for the name of the seam {list_some(unnamed)}: see the table of seams",)
+    )
+    return Drawing(float(width), float(height), tuple(lines), tuple(rooms.texts()), notes)
 
 
 @dataclass(frozen=True, eq=False)

@@ -30,6 +30,10 @@ OUTSIDE_NUMBER, OUTSIDE_DISTANCES = 2.0, tuple(range(3, 40, 2))
 # Places along a side, as fractions of its length, and distances from it relative to the text, in the order in which
 # they are tried for its name.
 ALONG, INWARD = (0.5, 0.42, 0.58, 0.33, 0.67, 0.22, 0.78, 0.12, 0.88), (1.1, 1.6)
+# Height of names at the end of a line that leads to their side, the distances of their middles from it, mm, and the
+# angles to the normal of the side that are tried.
+LEADER_SIZE, LEADER_DISTANCES = 1.8, (6.0, 9.0, 12.0, 16.0, 20.0, 26.0, 32.0, 40.0, 50.0)
+LEADER_TURNS = (0.0, 0.35, -0.35, 0.8, -0.8, 1.2, -1.2)
 # Longest and shortest grain line, and length of the arms of its arrows, mm; lengths and places of its middle that are
 # tried, as fractions of the length of the piece there.
 MAX_GRAIN, MIN_GRAIN, ARROW = 120.0, 10.0, 3.0
@@ -127,8 +131,13 @@ def _chords(room: Labels, x: float) -> Iterator[tuple[float, float, float]]:
         yield x, bottom, top
 
 
-def add_seam_name(rooms: tuple[Labels, Labels, Labels], name: str, side: FloatArray, width: float) -> None:
+def add_seam_name(
+    rooms: tuple[Labels, Labels, Labels], name: str, side: FloatArray, width: float
+) -> list[Line] | None:
     """Place the name of a seam along a side, near its middle: inside the piece, or else outside.
+
+    A name without room there is placed farther away, and the line that leads to it is returned; None if there is no
+    room either.
 
     Args:
         rooms: the piece, its allowance, and what is outside.
@@ -148,12 +157,34 @@ def add_seam_name(rooms: tuple[Labels, Labels, Labels], name: str, side: FloatAr
             for shift, middle in product(shifts, middles):
                 yield _beside(name, side, along, middle, half, size, start + shift * size)
 
-    _ = (
+    text = (
         inside.add(texts(SEAM_SIZES, INWARD))
         or allowance.add(texts(sizes, (0.0,), -width / 2))
-        or outside.add(texts(SEAM_SIZES[2:], (-INWARD[0], -INWARD[1], -3.0), -width))
-        or inside.add(texts(SEAM_SIZES[2:], INWARD), crosses_lines=True)
+        or outside.add(texts(SEAM_SIZES[2:-1], (-INWARD[0], -INWARD[1], -3.0), -width))
+        or inside.add(texts(SEAM_SIZES[2:-1], INWARD), crosses_lines=True)
     )
+    if text is not None:
+        return []
+    middle = np.array([np.interp(along[-1] / 2, along, column) for column in side.T])
+    chord = side[-1] - side[0]
+    text = inside.add(_around(name, middle, chord)) or outside.add(_around(name, middle, chord))
+    return None if text is None else [Line("mark", np.array([middle, _nearest_end(text, middle)]))]
+
+
+def _around(name: str, middle: FloatArray, chord: FloatArray) -> Iterator[Text]:
+    """Yield horizontal texts around the middle of a side, the nearest first; chord: (2,) from its start to its end."""
+    normal = np.arctan2(chord[0], -chord[1])
+    for distance, turn in product(LEADER_DISTANCES, LEADER_TURNS):
+        for angle in (normal + turn, normal + turn + np.pi):
+            place = middle + distance * np.array([np.cos(angle), np.sin(angle)])
+            yield Text(name, place, LEADER_SIZE)
+
+
+def _nearest_end(text: Text, point: FloatArray) -> FloatArray:
+    """Return the middle of the left or the right end of a horizontal text, whichever is nearer to a point."""
+    half = np.array([text_width(text.text, text.size) / 2, 0.0])
+    ends = [text.place - half, text.place + half]
+    return min(ends, key=lambda end: float(np.linalg.norm(end - point)))
 
 
 def _beside(

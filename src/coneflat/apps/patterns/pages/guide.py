@@ -82,7 +82,7 @@ def _overview(
     top -= picture_height + SPACE
     texts += [*numbers, *(replace(text, place=text.place + np.array([0.0, top])) for text in steps)]
     text_top = top + float(steps[-1].place[1]) - SPACE
-    sentences = [_sentence(note) for note in pattern.notes]
+    sentences = [_sentence(note) for note in (*pattern.notes, *pattern.drawing().notes)]
     notes = [*_list_of_text(sentences, column, text_top, numbered=False)]
     have_room = not notes or float(notes[-1].place[1]) > bottom
     texts += notes if have_room else []
