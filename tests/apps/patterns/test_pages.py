@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from math import ceil
+
 import numpy as np
 import polyhedra
 import pytest
@@ -10,8 +13,9 @@ from flat_pieces import gores, sheet, two_pieces
 import coneflat
 from coneflat import Pattern
 from coneflat.apps.patterns.drawing.drawing import Drawing, Line
-from coneflat.apps.patterns.drawing.labels import box_of
+from coneflat.apps.patterns.drawing.labels import CHARACTER_WIDTH, box_of
 from coneflat.apps.patterns.pages.assembly import pattern_pages
+from coneflat.apps.patterns.pages.guide import CHARACTER
 from coneflat.apps.patterns.pages.nesting import nested
 from coneflat.apps.patterns.pages.pages import cut_shapes, page_map, ruler, tiled
 from coneflat.apps.patterns.pages.tiling import tiles_of
@@ -108,6 +112,34 @@ def test_each_point_of_a_line_is_visible_on_a_page_at_its_true_size():
     joined = shapely.union_all(list(seen.values()))
     assert len(seen) == 4
     assert joined.hausdorff_distance(border) < 1e-6
+
+
+PLAIN = {"cloth": two_pieces, "gores": gores}
+LONG = "A name of a file that is much longer than the page is wide, with its date and version 2026-11-30"
+
+
+@pytest.mark.parametrize("page", ["A4", "A5", "letter", "none", "roll:120mm"])
+@pytest.mark.parametrize("kind", [*PLAIN, "net", "sheet"])
+def test_nothing_is_outside_of_a_page(kind, page):
+    if kind in PLAIN:
+        pattern = PLAIN[kind](page=page)
+    else:
+        side = polyhedra.turned([0.3, 0.3], [0.0, 0.5], 7) if kind == "sheet" else polyhedra.icosphere(1)
+        pattern = coneflat.pattern(side.vertices, side.faces, kind=kind, height="30mm", page=page)
+    notes = tuple(f"note {i}: {'some words about it, ' * 4}and more" for i in range(3))
+    pattern, share = nested(replace(pattern, notes=notes)), CHARACTER / CHARACTER_WIDTH
+    for sheet_of_paper in pattern_pages(pattern, pattern.drawing(), Paper.of(page), LONG):
+        drawing = sheet_of_paper.drawing
+        box = shapely.box(0, 0, drawing.width, drawing.height)
+        # Boxes of texts are rather too wide; the mean width of characters is that of longer texts.
+        texts = [
+            box_of(replace(text, text=text.text[: ceil(share * len(text.text))])) for text in drawing.texts
+        ]
+        assert all(box.covers(text) for text in texts)
+        assert all(box.covers(shapely.LineString(line.points)) for line in drawing.lines)
+        for picture in sheet_of_paper.pictures:
+            high = picture.low + np.array([picture.width, picture.height])
+            assert box.covers(shapely.box(*picture.low, *high))
 
 
 def test_rulers_have_their_length():

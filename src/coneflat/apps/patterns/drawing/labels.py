@@ -106,6 +106,11 @@ def text_width(text: str, size: float) -> float:
     return CHARACTER_WIDTH * size * len(text)
 
 
+def fitted_size(text: str, size: float, width: float) -> float:
+    """Return the height of capitals of a text, mm, smaller than `size` if the text would be wider than `width`."""
+    return min(size, size * width / max(text_width(text, size), np.finfo(float).tiny))
+
+
 def box_of(text: Text) -> Polygon:
     """Return the rectangle that a text covers."""
     half = np.array([text_width(text.text, text.size), LINE_HEIGHT * text.size]) / 2

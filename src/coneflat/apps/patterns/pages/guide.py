@@ -10,6 +10,7 @@ import numpy as np
 
 from ....base import FloatArray, plural
 from ..drawing.drawing import Drawing, Text
+from ..drawing.labels import fitted_size
 from ..finish import Finish
 from ..papers import IN_INCHES, MARGIN, Paper
 from ..report import piece_sizes
@@ -28,8 +29,8 @@ PIXELS = 200 / 25.4
 TITLE, BODY, NUMBER, LEADING = 5.0, 2.3, 3.4, 4.4
 # Width of the numbers of a list, mm.
 INDENT = 6.0
-# Height of the pictures relative to that of the page, and the smallest one.
-PICTURES, MIN_PICTURES = 0.4, 0.15
+# Height of the pictures relative to that of the page, and the smallest one for notes on the same page, and for steps.
+PICTURES, MIN_WITH_NOTES, MIN_PICTURES = 0.4, 0.25, 0.15
 # Widths of a column of text beside the map of the pages, or that of the strain alone, relative to the page; mean width
 # of a character of longer texts relative to the height of capitals.
 TEXT_SHARE, HALF, CHARACTER = 0.66, 0.5, 0.76
@@ -68,7 +69,8 @@ def _overview(
     rulers = ruler(np.array([MARGIN, MARGIN]), own_paper)
     bottom = MARGIN + (25.0 if own_paper.name in IN_INCHES else 14.0)
     top = MARGIN + height
-    texts = [Text(title, np.array([MARGIN, top - TITLE / 2]), TITLE, is_left=True)]
+    title_size = fitted_size(title, TITLE, width)
+    texts = [Text(title, np.array([MARGIN, top - TITLE / 2]), title_size, is_left=True)]
     top -= TITLE + SPACE
     texts += _lines_of_text(_summary(pattern), width, top)
     top = min(float(text.place[1]) for text in texts) - SPACE
@@ -76,13 +78,16 @@ def _overview(
     has_map, has_strain = len(tiles) > 1 and paper.height is not None, is_strained(pattern)
     column = (TEXT_SHARE if has_map else HALF if has_strain else 1.0) * width
     steps = [*_list_of_text(steps_of(pattern, tiles, paper), column, 0.0)]
+    sentences = [_sentence(note) for note in pattern.notes]
     room = top - bottom + float(steps[-1].place[1]) - 3 * SPACE
+    room_with_notes = room - _height_of_list(sentences, column)
+    if room_with_notes >= MIN_WITH_NOTES * height:
+        room = room_with_notes
     picture_height = max(min(PICTURES * height, room), MIN_PICTURES * height)
     pictures, numbers = _pictures(pattern, width, picture_height, top)
     top -= picture_height + SPACE
     texts += [*numbers, *(replace(text, place=text.place + np.array([0.0, top])) for text in steps)]
     text_top = top + float(steps[-1].place[1]) - SPACE
-    sentences = [_sentence(note) for note in (*pattern.notes, *pattern.drawing().notes)]
     notes = [*_list_of_text(sentences, column, text_top, numbered=False)]
     have_room = not notes or float(notes[-1].place[1]) > bottom
     texts += notes if have_room else []
@@ -160,6 +165,14 @@ def _list_of_text(items: Sequence[str], width: float, top: float, numbered: bool
             yield Text(line, np.array([MARGIN + INDENT, y]), BODY, is_left=True)
             y -= LEADING
         y -= LEADING / 4
+
+
+def _height_of_list(items: Sequence[str], width: float) -> float:
+    """Return the height of a list without numbers, with the space above it; 0 if it is empty."""
+    if not items:
+        return 0.0
+    *_, last = _list_of_text(items, width, 0.0, numbered=False)
+    return SPACE + LEADING - float(last.place[1])
 
 
 def _sentence(note: str) -> str:

@@ -13,7 +13,7 @@ from ....base import FloatArray
 from ....errors import OptionError
 from ..drawing.allowances import shapely
 from ..drawing.drawing import Drawing, Line, Text
-from ..drawing.labels import box_of
+from ..drawing.labels import box_of, fitted_size
 from ..papers import IN_INCHES, LONGEST, MARGIN, Paper
 from .tiling import Tile, tiles_of
 
@@ -22,8 +22,9 @@ if TYPE_CHECKING:
 
 # Length of crop marks, gap between them and the corner, and radius of registration marks, mm.
 CROP, CROP_GAP, REGISTRATION = 6.0, 1.5, 2.0
-# Height of capitals in margins, mm.
-MARGIN_TEXT = 2.2
+# Height of capitals in margins, mm; share of the width of a page that the title takes there, between the names of
+# neighbours.
+MARGIN_TEXT, TITLE_SHARE = 2.2, 0.45
 #: Lengths of the rulers, mm and inches, and the height of their longest ticks, mm.
 RULER, RULER_INCHES, TICK = 100, 4, 4.0
 #: Height of the strip for the ruler below a drawing that is not tiled, mm.
@@ -100,9 +101,12 @@ def _page(drawing: Drawing, tile: Tile, paper: Paper, count: int, title: str) ->
     low = np.array([MARGIN, below])
     size = tile.high - tile.low
     width, height = size + low + MARGIN
+    if paper.height is None:  # The ruler may be wider than the drawing, but not than a roll.
+        width = max(width, min(RULER + 2 * MARGIN, paper.width or np.inf))
     lines: list[Line] = []
     name = f"{title}   page {tile.name} of {count}" if count > 1 else title
-    texts = [Text(name, np.array([width / 2, MARGIN / 2]), MARGIN_TEXT)]
+    place = np.array([width / 2, MARGIN / 2])
+    texts = [Text(name, place, fitted_size(name, MARGIN_TEXT, TITLE_SHARE * float(width)))]
     if tile.overlaps and count > 1:
         lines += _crop_marks(low, low + size)
         texts += _neighbours(tile, low, low + size)
