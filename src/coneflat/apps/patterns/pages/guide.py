@@ -78,7 +78,7 @@ def _overview(
     has_map, has_strain = len(tiles) > 1 and paper.height is not None, is_strained(pattern)
     column = (TEXT_SHARE if has_map else HALF if has_strain else 1.0) * width
     steps = [*_list_of_text(steps_of(pattern, tiles, paper), column, 0.0)]
-    sentences = [_sentence(note) for note in pattern.notes]
+    sentences = [_sentence(note) for note in (*pattern.notes, *pattern.drawing().notes)]
     room = top - bottom + float(steps[-1].place[1]) - 3 * SPACE
     room_with_notes = room - _height_of_list(sentences, column)
     if room_with_notes >= MIN_WITH_NOTES * height:
