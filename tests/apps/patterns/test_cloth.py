@@ -19,7 +19,7 @@ from coneflat.apps.patterns.pieces.cut_surface import CutSurface
 from coneflat.apps.patterns.pieces.equal_sides import with_equal_sides
 from coneflat.apps.patterns.pieces.least_strain import least_strain
 from coneflat.apps.patterns.pieces.power_sum import PowerSum
-from coneflat.apps.patterns.pieces.relaxing import excess
+from coneflat.apps.patterns.pieces.relaxing import SMALLEST, excess, relaxed
 from coneflat.apps.patterns.pieces.strain import FlatEdges, Stretch
 from coneflat.apps.patterns.units import length_of
 from coneflat.errors import OptionError
@@ -110,6 +110,41 @@ def test_both_sides_of_seams_become_equally_long():
     assert len(first)
     assert lengths[first] == pytest.approx(lengths[second], rel=1e-11)
     assert np.abs(points - surface.points).max() < 0.2
+
+
+def test_sides_become_equally_long_by_free_points_alone():
+    surface = cut_sphere()
+    closed = surface.with_points(with_equal_sides(surface.edges, surface.corners, surface.points))
+    is_free = np.zeros(len(surface.points), dtype=bool)
+    is_free[surface.corners[:80]] = True
+    noise = 1e-3 * np.random.default_rng(0).standard_normal(surface.points.shape)
+    start = closed.points + noise * is_free[:, None]
+    points = with_equal_sides(surface.edges, surface.corners, start, is_free)
+    lengths = np.linalg.norm(surface.edges.vectors(points), axis=1)
+    first, second = surface.edges.partners.T
+    assert lengths[first] == pytest.approx(lengths[second], rel=1e-11)
+    assert np.array_equal(points[~is_free], start[~is_free])
+
+
+def test_exponents_are_left_out_once_the_strain_is_within():
+    surface = cut_sphere()
+    wide, narrow = Stretch(10.0, 10.0), Stretch(1e-3, 1e-3)
+    for stretch, is_same in ((wide, True), (narrow, False)):
+        points = relaxed(surface, stretch, SMALLEST, until_within=True).points
+        assert np.array_equal(points, surface.points) == is_same
+
+
+def test_moved_points_keep_what_does_not_depend_on_them():
+    surface = cut_sphere()
+    before = surface.edges, surface.pieces, surface.seams
+    moved = surface.with_points(2 * surface.points)
+    fresh = CutSurface(surface.mesh, surface.corners, 2 * surface.points)
+    assert all(
+        part is first for part, first in zip((moved.edges, moved.pieces, moved.seams), before, strict=True)
+    )
+    assert np.array_equal(moved.places, fresh.places)
+    assert np.array_equal(moved.edges.ends, fresh.edges.ends)
+    assert np.array_equal(moved.pieces, fresh.pieces)
 
 
 def test_cloth_is_within_its_strain_without_overlaps(ball):

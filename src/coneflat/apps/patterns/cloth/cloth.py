@@ -34,7 +34,10 @@ ISOMETRIC = 4.0
 # Strains that are evenly distributed up to the bound in all directions give 8/3. More energy leaves more to slits.
 ENERGIES_PER_STRAIN = (3.0, 6.0, 12.0, 24.0)
 # Fraction of edges beyond the bound above which the seams of a texture are so few that slits get longer than they were.
-MAX_STRAINED = 0.3
+MAX_STRAINED = 0.2
+# Length of seams, relative to the shortest ones that were found, at which the slits of a texture are given up: pieces
+# that are joined again hardly ever make up for so many.
+MAX_LENGTH = 1.5
 # Fractions of the work that is left, for the progress, that one of them is, and smoothing.
 TEXTURE_SHARE, SMOOTHING_SHARE = 0.4, 0.7
 # The same for the half of a symmetric model.
@@ -109,14 +112,18 @@ def cut_cloth(model: Model, stretch: Stretch, required: IntArray) -> CutSurface:
         stretch: what the material allows; if no cut was found within it, the largest strain is as small as was found.
         required: (k, 2) the vertices of edges that remain cut.
     """
-    surfaces = list[CutSurface]()
+    surfaces, max_length = list[CutSurface](), np.inf
     for number, energy in enumerate(ENERGIES_PER_STRAIN):
         with part_of_work(TEXTURE_SHARE, f"attempt {number + 1}"):
             texture = _texture(model, ISOMETRIC + energy * (stretch.warp**2 + stretch.weft**2) / 2)
             slitting = Slitting.of(texture, stretch)
             if surfaces and slitting.strained_share > MAX_STRAINED:
                 break
-            surfaces.append(with_joined_pieces(slitting.until_within(), stretch, required))
+            slit = slitting.until_within(max_length)
+            if slit.seam_length > max_length:
+                break
+            surfaces.append(with_joined_pieces(slit, stretch, required))
+            max_length = MAX_LENGTH * min(surface.seam_length for surface in surfaces)
         if not len(texture.seams):
             break
     return min(

@@ -115,9 +115,11 @@ def _within(surface: CutSurface, is_free: BoolArray, stretch: Stretch, allowed: 
     if excess(even, stretch).max() > allowed + HOPELESS:
         return None
     flat = relaxed(even, stretch, SMALLEST, is_free)
-    if excess(flat, stretch).max() > allowed or len(flat.overlaps()):
+    if excess(flat, stretch).max() > allowed:
         return None
-    closed = closed_seams(flat)
+    closed = closed_seams(flat, is_free)
+    if excess(closed, stretch).max() > allowed:
+        closed = closed_seams(flat)
     if excess(closed, stretch).max() > allowed or len(closed.overlaps()):
         return None
     return closed

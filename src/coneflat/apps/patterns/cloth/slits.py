@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -55,14 +55,16 @@ class Slitting:
         """The fraction of edges that are strained beyond the bound."""
         return float((excess(self.flat, self.stretch) > 0).mean())
 
-    def until_within(self) -> CutSurface:
+    def until_within(self, max_length: float = np.inf) -> CutSurface:
         """Return the surface with slits until its strain is within the bound, and nothing overlaps.
+
+        It is also returned once its seams are longer than `max_length`.
 
         Every round cuts more edges. The strain remains beyond the bound only if triangles that are cut apart could not
         be laid out.
         """
         slitting, seam_count = self, -1
-        while len(slitting.flat.seams) > seam_count:
+        while len(slitting.flat.seams) > seam_count and slitting.flat.seam_length <= max_length:
             begin_step()
             seam_count = len(slitting.flat.seams)
             surface = slitting.flat
@@ -91,12 +93,14 @@ class Slitting:
         return self._relaxed_near(even, even, np.setdiff1d(separated.seams, self.flat.seams))
 
     def _relaxed_near(self, even: CutSurface, flat: CutSurface, cuts: IntArray) -> Slitting:
-        """Return layouts relaxed around new cuts (k,), edges of the mesh; the second from the first one there."""
+        """Return layouts relaxed around new cuts (k,), edges of the mesh."""
         is_cut = mask_of(len(even.mesh.vertices), even.mesh.edges[cuts])
         is_free = nearby(even.corners, has_any(is_cut, even.mesh.faces), RINGS)
         even = relaxed(even, self.stretch, EVEN[-1:], is_free)
-        start = replace(flat, points=np.where(is_free[:, None], even.points, flat.points))
-        return Slitting(even, relaxed(start, self.stretch, SMALLEST, is_free), self.stretch)
+        exponents = (*EVEN[-1:], *SMALLEST)
+        return Slitting(
+            even, relaxed(flat, self.stretch, exponents, is_free, until_within=True), self.stretch
+        )
 
 
 def _slits(surface: CutSurface, beyond: FloatArray, remains: BoolArray) -> IntArray:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -53,7 +53,7 @@ def cut_gores(mesh: TriangleMesh, count: int, axis: FloatArray) -> Development:
     _check_strips(flat, strips)
     flat = least_strained(_laid_out(flat))
     notes = tuple(_notes_on_strain(flat, strips))
-    return Development(replace(flat, points=_upright(flat, strips)), notes=notes)
+    return Development(flat.with_points(_upright(flat, strips)), notes=notes)
 
 
 def best_axis(mesh: TriangleMesh, count: int, upward: FloatArray) -> tuple[float, float, float]:
@@ -198,7 +198,7 @@ def _laid_out(flat: CutSurface) -> CutSurface:
         raise MetricError("strips could not be laid out without further cuts: increase the number of gores")
     points = np.empty_like(flat.points)
     points[flat.corners] = laid.places
-    return replace(flat, points=points)
+    return flat.with_points(points)
 
 
 def _opened_vertices(flat: CutSurface) -> FloatArray:

@@ -67,7 +67,7 @@ def grain_up(surface: CutSurface, axis: FloatArray) -> CutSurface:
         members = np.unique(surface.corners[surface.pieces == piece])
         positions = surface.mesh.vertices[surface.vertex_of_point[members]]
         points[members] = rotated_up(points[members], positions, np.asarray(axis), weights[members])
-    return replace(surface, points=points)
+    return surface.with_points(points)
 
 
 def nested(pattern: Pattern) -> Pattern:

@@ -96,6 +96,13 @@ class CutSurface:
         """(m, 3, 2) the corners of the triangles in the plane."""
         return self.points[self.corners]
 
+    def with_points(self, points: FloatArray) -> CutSurface:
+        """Return the surface with its points (u, 2) elsewhere in the plane."""
+        moved = replace(self, points=points)
+        # All that is computed from the mesh and the corners alone is the same.
+        vars(moved).update({name: value for name, value in vars(self).items() if name != "points"})
+        return moved
+
     def cut_along(self, seams: IntArray, places: FloatArray | None = None) -> CutSurface:
         """Return the surface with other seams; the sides of closed ones meet in the middle.
 

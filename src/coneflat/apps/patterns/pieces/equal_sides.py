@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.sparse import csc_matrix, csr_matrix, eye
 
-from ....base import FloatArray, IntArray
+from ....base import BoolArray, FloatArray, IntArray, has_any
 from ....errors import MetricError
 from ....geometry import signed_double_areas
 from ....linalg import factorize
@@ -15,13 +15,16 @@ from .strain import FlatEdges
 CLOSING_STEPS, CLOSED = 12, 1e-12
 
 
-def with_equal_sides(edges: FlatEdges, corners: IntArray, points: FloatArray) -> FloatArray:
+def with_equal_sides(
+    edges: FlatEdges, corners: IntArray, points: FloatArray, is_free: BoolArray | None = None
+) -> FloatArray:
     """Return points (n, 2) nearest to those given for which both sides of every seam edge are equally long.
 
     Args:
         edges: the edges of the layout.
         corners: (m, 3) the points of its triangles.
         points: (n, 2) places in which they are nearly so, without flipped triangles.
+        is_free: (n,) the points that move, at whose edges the sides differ; None for all.
 
     Raises:
         MetricError: there are none nearby, or a triangle would be flipped.
@@ -29,8 +32,14 @@ def with_equal_sides(edges: FlatEdges, corners: IntArray, points: FloatArray) ->
     Notes:
         Newton's method on the differences, each step the smallest one in the squared change of all lengths.
     """
+    if is_free is not None:
+        is_triangle = has_any(is_free, corners)
+        edges, corners = edges.around(is_free, is_triangle), corners[is_triangle]
+    else:
+        is_free = np.ones(len(points), dtype=bool)
     if not len(edges.partners):
         return points
+    is_unknown, points = np.repeat(is_free, 2), points.copy()
     first, second = edges.partners.T
     lengths = edges.lengths[first]
     for _ in range(CLOSING_STEPS):
@@ -42,9 +51,9 @@ def with_equal_sides(edges: FlatEdges, corners: IntArray, points: FloatArray) ->
                 return points
             break
         along = vectors / norms[:, None]
-        change = _edge_jacobian(edges.ends, along / edges.lengths[:, None], len(points))
+        change = _edge_jacobian(edges.ends, along / edges.lengths[:, None], len(points))[:, is_unknown]
         closing = change[first] - change[second]
-        points = points + _smallest_step(change, closing, gaps).reshape(-1, 2)
+        points[is_free] += _smallest_step(change, closing, gaps).reshape(-1, 2)
     raise MetricError("the two sides of seams could not be made equally long")
 
 

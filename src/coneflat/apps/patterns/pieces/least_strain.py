@@ -7,12 +7,13 @@ import numpy as np
 from ....base import BoolArray, FloatArray, IntArray, check_cancelled, has_any
 from ....linalg import Factor, factorize
 from .power_sum import PowerSum
-from .strain import FlatEdges, Stretch
+from .strain import FlatEdges, Stretch, relative_strains
 
 # Exponents of the strain whose sums are minimised one after the other. The last ones all but minimise the largest.
 EXPONENTS = (2, 4, 8, 16, 32)
-# Newton steps for each exponent; fewer are made where a step gains less than GAIN.
-STEPS, GAIN = 8, 1e-3
+# Newton steps for each exponent; fewer are made where a step lowers the mean of the powers by less than this fraction
+# of the strain.
+STEPS, GAIN = 8, 3e-4
 # Sum that counts as 0.
 TINY = 1e-300
 # Halvings of a step until it flips no triangle and lowers the sum, by this fraction of the linear decrease.
@@ -26,6 +27,7 @@ def least_strain(
     stretch: Stretch,
     exponents: tuple[int, ...] = EXPONENTS,
     is_free: BoolArray | None = None,
+    until_within: bool = False,
 ) -> FloatArray:
     """Return points (n, 2) in the plane whose largest strain, relative to what a material allows, is small.
 
@@ -38,6 +40,7 @@ def least_strain(
         stretch: what the material allows.
         exponents: of the strain, whose sum over all edges, weighted by squared lengths, is minimised for each in turn.
         is_free: (n,) the points that move; None for all.
+        until_within: whether exponents are left out once all strains are within what the material allows.
 
     Notes:
         Newton's method with the positive part of the Hessian. The bounds by direction are those at the start of a step.
@@ -51,10 +54,12 @@ def least_strain(
     factor: Factor | None = None
     total = PowerSum(edges, corners, stretch, is_free)
     for exponent in exponents:
+        if until_within and (np.abs(relative_strains(edges, points, stretch)) <= 1).all():
+            break
         for _ in range(STEPS):
             check_cancelled()
             points, factor, gain = _after_step(total, points, exponent, factor)
-            if gain < GAIN:
+            if gain < exponent * GAIN:
                 break
     return points
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import replace
 
 import numpy as np
 
@@ -28,12 +27,18 @@ AIM = 0.99
 
 
 def relaxed(
-    surface: CutSurface, stretch: Stretch, exponents: Sequence[int], is_free: BoolArray | None = None
+    surface: CutSurface,
+    stretch: Stretch,
+    exponents: Sequence[int],
+    is_free: BoolArray | None = None,
+    until_within: bool = False,
 ) -> CutSurface:
     """Return a cut surface with less strain; arguments as of `least_strain`."""
     aim = Stretch(AIM * stretch.warp, AIM * stretch.weft)
-    points = least_strain(surface.edges, surface.corners, surface.points, aim, tuple(exponents), is_free)
-    return replace(surface, points=points)
+    points = least_strain(
+        surface.edges, surface.corners, surface.points, aim, tuple(exponents), is_free, until_within
+    )
+    return surface.with_points(points)
 
 
 def least_strained(surface: CutSurface) -> CutSurface:
@@ -51,10 +56,15 @@ def _largest_strain(surface: CutSurface) -> float:
     return float(np.abs(surface.edges.strains(surface.points)).max())
 
 
-def closed_seams(surface: CutSurface) -> CutSurface:
-    """Return a surface whose seams have sides of the same length; where that is impossible, they are eased."""
-    with suppress(MetricError):
-        return replace(surface, points=with_equal_sides(surface.edges, surface.corners, surface.points))
+def closed_seams(surface: CutSurface, is_free: BoolArray | None = None) -> CutSurface:
+    """Return a surface whose seams have sides of the same length; where that is impossible, they are eased.
+
+    is_free: (n,) the points at which they may differ, which are moved if that is enough; None for all.
+    """
+    for is_moved in [is_free, None] if is_free is not None else [None]:
+        with suppress(MetricError):
+            points = with_equal_sides(surface.edges, surface.corners, surface.points, is_moved)
+            return surface.with_points(points)
     return surface
 
 

@@ -33,7 +33,10 @@ class FlatEdges:
     def of(cls, mesh: TriangleMesh, corners: IntArray) -> FlatEdges:
         """Return the edges of a layout; corners: (m, 3) the point at each corner of the triangles of `mesh`."""
         sides = np.stack([corners[:, [1, 2, 0]], corners[:, [2, 0, 1]]], axis=2).reshape(-1, 2)
-        ends, first = np.unique(np.sort(sides, axis=1), axis=0, return_index=True)
+        # Pairs of points as single numbers are sorted several times as fast.
+        count = int(corners.max()) + 1
+        keys, first = np.unique(sides.min(axis=1) * count + sides.max(axis=1), return_index=True)
+        ends = np.stack([keys // count, keys % count], axis=1)
         edges = mesh.halfedge_edges[first]
         tips = mesh.vertices[mesh.edges[edges]]
         order = np.argsort(edges, kind="stable")
