@@ -10,10 +10,12 @@ from scipy.spatial import cKDTree
 
 import coneflat
 from coneflat import TriangleMesh
+from coneflat.apps.patterns.cloth.cloth import unmet
 from coneflat.apps.patterns.cloth.joining import with_joined_pieces
 from coneflat.apps.patterns.cloth.simplification import simplified
 from coneflat.apps.patterns.cloth.slits import slit_until_within
 from coneflat.apps.patterns.cloth.smooth_seams import with_smooth_seams
+from coneflat.apps.patterns.options import PatternOptions
 from coneflat.apps.patterns.pieces.borders import find_borders, letters
 from coneflat.apps.patterns.pieces.cut_surface import CutSurface
 from coneflat.apps.patterns.pieces.equal_sides import with_equal_sides
@@ -21,7 +23,7 @@ from coneflat.apps.patterns.pieces.least_strain import least_strain
 from coneflat.apps.patterns.pieces.power_sum import PowerSum
 from coneflat.apps.patterns.pieces.relaxing import SMALLEST, excess, relaxed
 from coneflat.apps.patterns.pieces.strain import FlatEdges, Stretch
-from coneflat.apps.patterns.units import length_of
+from coneflat.apps.patterns.units import length_of, percentage
 from coneflat.errors import OptionError
 from coneflat.geometry import signed_double_areas, surface_distances
 from coneflat.mesh import open_along
@@ -301,6 +303,15 @@ def test_dense_meshes_are_simplified_within_the_tolerance():
     assert 0 < distances.mean() <= 0.01
     assert distances.max() >= surface_distances(coarse.vertices, coarse.faces, mesh.vertices).max()
     assert simplified(mesh, 1e-9)[0] is mesh
+    assert np.array_equal(np.ptp(coarse.vertices, axis=0), np.ptp(mesh.vertices, axis=0))
+
+
+def test_a_strain_beyond_its_bound_is_named_with_it():
+    surface = cut_sphere()
+    strains = surface.edges.strains(surface.points)
+    bound = float(np.abs(strains).max()) / 2
+    (note,) = unmet(surface, Stretch(bound, bound), PatternOptions())
+    assert f"up to {percentage(2 * bound)} instead of {percentage(bound)}" in note
 
 
 def test_every_border_half_edge_is_on_one_side(ball):
@@ -333,7 +344,7 @@ def test_lengths_have_units(text, length):
         ({}, "has no unit: give unit as mm"),
         ({"height": "0mm"}, "height must be a length, above 0"),
         ({"height": 100, "unit": "mm"}, "height and unit or scale cannot be combined"),
-        ({"unit": "mm", "strain": "0%"}, "strain must be above 0"),
+        ({"unit": "mm", "strain": "0%"}, "strain must be from 0.01 % to 100 %"),
         ({"unit": "mm", "kind": "net", "seams": [[0, 1]]}, "seams and kind net cannot be combined"),
         ({"unit": "furlong"}, "unknown unit"),
     ],

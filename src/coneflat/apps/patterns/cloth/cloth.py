@@ -22,6 +22,7 @@ from ..pieces.cut_surface import CutSurface
 from ..pieces.development import Development
 from ..pieces.relaxing import excess
 from ..pieces.strain import Stretch
+from ..units import percentage
 from .joining import with_joined_pieces
 from .mirrored import half_of_model, joined_across, with_images
 from .simplification import simplified
@@ -56,7 +57,7 @@ def cloth_pieces(model: Model, options: PatternOptions) -> Development:
     surface = pieces.surface
     if options.darts == "none":
         surface = without_darts(surface, stretch)
-    return Development(surface, notes=(*pieces.notes, *map(Unmet, _unmet(surface, stretch, options))))
+    return Development(surface, notes=(*pieces.notes, *map(Unmet, unmet(surface, stretch, options))))
 
 
 def _symmetric_pieces(model: Model, stretch: Stretch, tolerance: float) -> Development | None:
@@ -65,20 +66,21 @@ def _symmetric_pieces(model: Model, stretch: Stretch, tolerance: float) -> Devel
     if half is None:
         return None
     with part_of_work(HALF_SHARE):
-        pieces = _smooth_pieces(half.model, stretch, tolerance)
+        pieces = _smooth_pieces(half.model, stretch, tolerance, copies=2)
     surface = joined_across(with_images(pieces.surface, half.plane), half.plane, stretch)
     return None if excess(surface, stretch).any() else replace(pieces, surface=surface)
 
 
-def _smooth_pieces(model: Model, stretch: Stretch, tolerance: float) -> Development:
-    """Return a model, simplified if it is dense, cut into pieces along smooth seams."""
+def _smooth_pieces(model: Model, stretch: Stretch, tolerance: float, copies: int = 1) -> Development:
+    """Return a model, simplified if it is dense, cut into pieces along smooth seams; copies: 2 for a half."""
     mesh, notes = model.mesh, tuple[str, ...]()
     if model.seams is None:
-        mesh, distances = simplified(model.mesh, tolerance)
+        mesh, distances = simplified(model.mesh, tolerance, copies)
         if mesh is not model.mesh:
+            counts = [copies * len(surface.faces) for surface in (mesh, model.mesh)]
             notes = (
-                f"The pattern is that of a mesh with {len(mesh.faces):,} instead of {len(model.mesh.faces):,} "
-                f"triangles, {distances.mean():.2g} mm from it on average and {distances.max():.2g} mm at most.",
+                f"The pattern is that of a mesh with {counts[0]:,} instead of {counts[1]:,} triangles, "
+                f"{distances.mean():.2g} mm from it on average and {distances.max():.2g} mm at most.",
             )
     required = np.empty((0, 2), dtype=np.int64) if model.seams is None else model.seams
     surface = cut_cloth(replace(model, mesh=mesh), stretch, required)
@@ -91,13 +93,16 @@ def _smooth_pieces(model: Model, stretch: Stretch, tolerance: float) -> Developm
     return Development(surface, notes=notes)
 
 
-def _unmet(surface: CutSurface, stretch: Stretch, options: PatternOptions) -> Iterator[str]:
+def unmet(surface: CutSurface, stretch: Stretch, options: PatternOptions) -> Iterator[str]:
+    """Yield which bounds of the strain and requests of the options a cut surface does not meet."""
     beyond = excess(surface, stretch)
     if beyond.any():
-        reached = 100 * float(np.abs(surface.edges.strains(surface.points)).max())
+        worst = int(beyond.argmax())
+        strain = abs(float(surface.edges.strains(surface.points)[worst]))
         yield (
             f"{plural(int((beyond > 0).sum()), 'edge')} of {len(beyond):,} are strained more than allowed, up to "
-            f"{reached:.2g} %, and no cut with less was found: allow more, or refine the mesh there."
+            f"{percentage(strain)} instead of {percentage(strain / (1 + beyond[worst]))}, and no cut with less was "
+            "found: allow more, or refine the mesh there."
         )
     darts = sum(seam.is_dart for seam in find_borders(surface).seams)
     if options.darts == "none" and darts:

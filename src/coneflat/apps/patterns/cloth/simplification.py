@@ -8,13 +8,13 @@ from .... import TriangleMesh
 from ....base import FloatArray, IntArray
 from ....geometry import coarse_mesh, surface_distances
 
-# Numbers of triangles of a simplified mesh that are tried; one with fewer than LEAST_TRIANGLES is left as it is.
-COUNTS, LEAST_TRIANGLES = (6_000, 12_000, 24_000), 10_000
+# Numbers of triangles of a simplified mesh that are tried.
+COUNTS = (6_000, 12_000, 24_000)
 # Largest distance of a simplified mesh, relative to the diagonal of the box around the model.
 MAX_DISTANCE = 0.01
 
 
-def simplified(mesh: TriangleMesh, tolerance: float) -> tuple[TriangleMesh, FloatArray]:
+def simplified(mesh: TriangleMesh, tolerance: float, copies: int = 1) -> tuple[TriangleMesh, FloatArray]:
     """Return a mesh with fewer triangles if it has many, and the distances between both surfaces.
 
     The distances are measured at the vertices and at the middles of the edges of both.
@@ -23,9 +23,10 @@ def simplified(mesh: TriangleMesh, tolerance: float) -> tuple[TriangleMesh, Floa
         mesh: the mesh.
         tolerance: largest mean distance allowed; 0 for no change. If the smallest number of triangles within it is no
             less than half of those of the mesh, it remains.
+        copies: number of equal meshes that share the triangles.
     """
-    for count in COUNTS:
-        if tolerance == 0 or len(mesh.faces) < max(LEAST_TRIANGLES, 2 * count):
+    for count in (total // copies for total in COUNTS):
+        if tolerance == 0 or len(mesh.faces) < 2 * count:
             break
         coarse = _simplified_parts(mesh, count)
         distances = _distances(mesh, coarse)
@@ -36,11 +37,12 @@ def simplified(mesh: TriangleMesh, tolerance: float) -> tuple[TriangleMesh, Floa
 
 
 def _simplified_parts(mesh: TriangleMesh, count: int) -> TriangleMesh:
-    """Return a mesh with about a number of triangles in all components together."""
+    """Return a mesh with about a number of triangles in all components together; their extents remain."""
     vertices, faces, start = list[FloatArray](), list[IntArray](), 0
     for part, _, _ in mesh.split_components():
         share = round(count * len(part.faces) / len(mesh.faces))
-        coarse = coarse_mesh(part, max(share, 4)).mesh
+        extremes = np.concatenate([part.vertices.argmin(axis=0), part.vertices.argmax(axis=0)])
+        coarse = coarse_mesh(part, max(share, 4), np.unique(extremes)).mesh
         vertices.append(coarse.vertices)
         faces.append(coarse.faces + start)
         start += len(coarse.vertices)

@@ -79,7 +79,7 @@ class Slitting:
                 if not beyond.any():
                     return surface
             slitting = slitting._with_slits(beyond > 0)
-        return closed_seams(slitting.flat)
+        return closed_seams(without_overlaps(slitting.flat))
 
     def _with_slits(self, remains: BoolArray) -> Slitting:
         """Return the surface with slits to regions of flat edges whose strain remains too large, (k,) True."""
