@@ -21,6 +21,16 @@ def sheet(width: float = 120.0, height: float = 80.0, columns: int = 6, rows: in
     return CutSurface(TriangleMesh(np.pad(points, ((0, 0), (0, 1))), faces), faces, points)
 
 
+def annulus(inner: float = 500.0, outer: float = 560.0, columns: int = 96) -> CutSurface:
+    """A ring in the plane, of one piece; its radii in millimetres."""
+    angles = 2 * np.pi * np.arange(columns) / columns
+    circle = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    points = np.concatenate([inner * circle, outer * circle])
+    a, b = np.arange(columns), (np.arange(columns) + 1) % columns
+    faces = np.concatenate([np.stack([a, a + columns, b + columns], 1), np.stack([a, b + columns, b], 1)])
+    return CutSurface(TriangleMesh(np.pad(points, ((0, 0), (0, 1))), faces), faces, points)
+
+
 def cut_at(surface: CutSurface, x: float, until: float = np.inf) -> CutSurface:
     """A surface that is cut along a vertical line, up to a height."""
     mesh = surface.mesh

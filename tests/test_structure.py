@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 import re
 import sys
-from graphlib import CycleError
+from graphlib import CycleError, TopologicalSorter
 from importlib import import_module
 from pathlib import Path
 
@@ -46,6 +46,23 @@ def test_packages_do_not_import_each_other_in_circles():
 
 def test_files_do_not_import_each_other_in_circles():
     assert file_circles(read_modules()) == []
+
+
+def test_folders_of_patterns_do_not_import_each_other_in_circles():
+    """Files beside the folders, such as the result, combine them."""
+    folders: dict[str, set[str]] = {}
+    for name, module in read_modules().items():
+        folder = _folder_of_patterns(name)
+        if folder:
+            imported = {_folder_of_patterns(target) for target in module.imports | module.late_imports}
+            folders.setdefault(folder, set()).update(imported - {"", folder})
+    assert {"pieces", "drawing", "pages"} <= folders.keys()
+    assert [*TopologicalSorter(folders).static_order()]
+
+
+def _folder_of_patterns(name: str) -> str:
+    inner = name.removeprefix("apps.patterns.") if name.startswith("apps.patterns.") else ""
+    return inner.partition(".")[0] if "." in inner else ""
 
 
 def test_entry_points_are_functions_of_the_package():

@@ -16,10 +16,11 @@ from coneflat.apps.patterns.cloth.simplification import simplified
 from coneflat.apps.patterns.cloth.slits import slit_until_within
 from coneflat.apps.patterns.cloth.smooth_seams import with_smooth_seams
 from coneflat.apps.patterns.options import PatternOptions
-from coneflat.apps.patterns.pieces.borders import find_borders, letters
+from coneflat.apps.patterns.pieces.borders import find_borders
 from coneflat.apps.patterns.pieces.cut_surface import CutSurface
 from coneflat.apps.patterns.pieces.equal_sides import with_equal_sides
 from coneflat.apps.patterns.pieces.least_strain import least_strain
+from coneflat.apps.patterns.pieces.numbering import letters
 from coneflat.apps.patterns.pieces.power_sum import PowerSum
 from coneflat.apps.patterns.pieces.relaxing import SMALLEST, excess, relaxed
 from coneflat.apps.patterns.pieces.strain import FlatEdges, Stretch

@@ -9,7 +9,6 @@ from flat_pieces import gores, two_pieces
 from coneflat import Pattern, TriangleMesh
 from coneflat.apps.patterns.drawing.counterparts import SAME_SHAPE
 from coneflat.apps.patterns.pages.steps import steps_of
-from coneflat.apps.patterns.papers import Paper
 from coneflat.apps.patterns.pieces.cut_surface import CutSurface
 
 pytest.importorskip("shapely")
@@ -88,9 +87,9 @@ def test_allowances_belong_to_the_shape():
 
 def test_the_guide_names_pairs_that_are_cut_from_doubled_cloth():
     pattern = pattern_of(1.1 * CORNERS, CORNERS, turned(0, True))
-    steps = " ".join(steps_of(pattern, [], Paper.of("A4")))
+    steps = " ".join(steps_of(pattern))
     assert (
         "Mirror images may be cut together from doubled cloth, with the paper of one of them: 2 and 3."
         in steps
     )
-    assert "doubled" not in " ".join(steps_of(two_pieces(), [], Paper.of("A4")))
+    assert "doubled" not in " ".join(steps_of(two_pieces()))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from flat_pieces import cut_at, sheet
@@ -87,11 +89,26 @@ def test_the_first_gore_does_not_depend_on_the_numbering_of_vertices():
 
 
 def test_pieces_are_numbered_by_size():
-    surface = cut_at(cut_at(sheet(), 20.0), 80.0)
-    areas = np.bincount(
-        surface.pieces, surface.mesh.face_areas if hasattr(surface.mesh, "face_areas") else None
-    )
-    assert (np.diff(areas) <= 0).all()
+    # The narrower of two pieces of 80 and 40 mm, which has fewer triangles, is drawn out to 200 mm.
+    surface = cut_at(sheet(), 80.0)
+    x, y, z = surface.mesh.vertices.T
+    drawn_out = np.stack([np.where(x > 80, 5 * x - 320, x), y, z], axis=1)
+    surface = replace(surface, mesh=TriangleMesh(drawn_out, surface.mesh.faces))
+    areas = np.bincount(surface.pieces, surface.edges.double_areas) / 2
+    assert areas.tolist() == pytest.approx([200 * 80, 80 * 80])
+
+
+def test_each_triangle_and_each_point_belongs_to_its_piece():
+    surface = cut_at(sheet(), 80.0)
+    shuffled = renumbered(surface, 0)
+    for cut in (surface, shuffled):
+        assert np.array_equal(np.sort(np.concatenate(cut.triangles_of_pieces)), np.arange(len(cut.pieces)))
+        assert np.array_equal(np.sort(np.concatenate([*cut.points_of_pieces])), np.arange(len(cut.points)))
+        for piece, (triangles, points) in enumerate(
+            zip(cut.triangles_of_pieces, cut.points_of_pieces, strict=True)
+        ):
+            assert (cut.pieces[triangles] == piece).all()
+            assert (cut.piece_of_point[points] == piece).all()
 
 
 def test_neighbouring_sides_have_neighbouring_names():

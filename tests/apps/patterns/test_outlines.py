@@ -15,15 +15,15 @@ from flat_pieces import gores, sheet, two_pieces, with_dart
 import coneflat
 from coneflat import Pattern, TriangleMesh
 from coneflat.apps.patterns.drawing.allowances import polygon_of, widened
-from coneflat.apps.patterns.drawing.gaps import notes_on_gaps
+from coneflat.apps.patterns.drawing.gaps import notes_on_gaps, notes_on_short_seams
 from coneflat.apps.patterns.drawing.labels import box_of
 from coneflat.apps.patterns.drawing.notches import notches_of
-from coneflat.apps.patterns.drawing.shapes import piece_shapes
 from coneflat.apps.patterns.finish import Finish, read_allowances
 from coneflat.apps.patterns.net.tabs import Tab
-from coneflat.apps.patterns.pages.nesting import GAP, grain_up, nested
+from coneflat.apps.patterns.pages.nesting import GAP, nested
 from coneflat.apps.patterns.pieces.borders import find_borders
 from coneflat.apps.patterns.pieces.cut_surface import CutSurface
+from coneflat.apps.patterns.pieces.grain import grain_up
 from coneflat.apps.patterns.pieces.polylines import distances, ends_of_straight_parts
 from coneflat.errors import OptionError
 
@@ -35,11 +35,6 @@ CORNER = np.array([[0.0, 0], [100, 0], [100, 40], [40, 40], [40, 100], [0, 100]]
 
 def uniform(ring, width):
     return np.full(len(ring), float(width))
-
-
-def shapes_of(pattern):
-    finish = Finish.of(pattern.kind, pattern.settings)
-    return piece_shapes(pattern.surface, pattern.borders, finish, pattern.tabs)
 
 
 def lengths_of(lines):
@@ -115,7 +110,7 @@ def test_with_allowance_all_sides_are_drawn_inside():
 
 def test_seams_are_named_in_allowances():
     pattern = two_pieces(allowance=0.0, seam_allowances="A=10mm")
-    assert [shape.cut.area for shape in shapes_of(pattern)] == pytest.approx([70 * 80] * 2)
+    assert [shape.cut.area for shape in pattern.shapes] == pytest.approx([70 * 80] * 2)
     with pytest.raises(
         OptionError, match="names the seam Q, which the pattern does not have: its seams are A"
     ):
@@ -124,7 +119,7 @@ def test_seams_are_named_in_allowances():
 
 def test_hems_have_a_name_in_allowances():
     pattern = two_pieces(allowance=0.0, seam_allowances="hem=10")
-    assert [shape.cut.area for shape in shapes_of(pattern)] == pytest.approx([70 * 100] * 2)
+    assert [shape.cut.area for shape in pattern.shapes] == pytest.approx([70 * 100] * 2)
 
 
 @pytest.mark.parametrize("text", ["A", "A=", "A=-1mm", "=3mm", "A=3kg"])
@@ -171,7 +166,7 @@ def test_short_seams_and_darts_have_no_notches():
 def test_notches_point_out_of_the_piece():
     pattern = two_pieces()
     for notches, shape in zip(
-        notches_of(pattern.seams[0], pattern.surface.points), shapes_of(pattern), strict=True
+        notches_of(pattern.seams[0], pattern.surface.points), pattern.shapes, strict=True
     ):
         for notch in notches:
             assert not shape.inside.contains(shapely.Point(notch.place + 0.1 * notch.outward))
@@ -196,7 +191,7 @@ def test_a_dart_is_marked_and_its_wedge_is_not_cut_out():
     assert [text.text for text in drawing.texts].count("dart A") == 2
     tip = pattern.surface.points[pattern.darts[0].tip]
     assert any(line.is_closed and np.allclose(line.points.mean(axis=0), tip) for line in drawing.lines)
-    (shape,) = shapes_of(pattern)
+    (shape,) = pattern.shapes
     assert shape.cut.contains(shapely.Point(tip - [0, 5]))
 
 
@@ -208,7 +203,7 @@ def test_no_text_covers_another_and_names_are_inside(count):
     assert not [pair for pair in combinations(boxes, 2) if pair[0].intersects(pair[1])]
     numbers = {text.text for text in drawing.texts}
     assert {str(i + 1) for i in range(count)} <= numbers
-    cut = [shape.cut for shape in shapes_of(pattern)]
+    cut = [shape.cut for shape in pattern.shapes]
     assert all(any(piece.contains(box) for piece in cut) for box in boxes)
     names = [text.text.split()[0] for text in drawing.texts if "(" in text.text]
     assert all(names.count(seam.name) == 2 for seam in pattern.seams)
@@ -250,7 +245,7 @@ def test_straight_parts_of_seams_end_where_they_have_turned_by_half_a_degree():
 def test_tabs_are_cut_out_with_their_piece():
     tab = Tab(np.array([[60.0, 10], [66, 16], [66, 64], [60, 70]]), seam=0, side=0, piece=0, edges=(0, 1))
     pattern = replace(two_pieces("net"), tabs=(tab,))
-    assert [shape.cut.area for shape in shapes_of(pattern)] == pytest.approx([4800 + 54 * 6, 4800])
+    assert [shape.cut.area for shape in pattern.shapes] == pytest.approx([4800 + 54 * 6, 4800])
     folds = [line for line in pattern.drawing().lines if line.layer == "fold"]
     assert lengths_of(folds) == pytest.approx([60])
 
@@ -285,7 +280,7 @@ def test_bends_are_drawn_where_their_piece_is_placed():
     corners = [[x, y, z] for y in (0, 80) for x, z in ((0, 0), (60, 0), (60, 40))]
     faces = [[0, 1, 4], [0, 4, 3], [1, 2, 5], [1, 5, 4]]
     placed = coneflat.pattern(corners, faces, kind="sheet", unit="mm", page="none")
-    (bend,), (shape,) = placed.bends, shapes_of(placed)
+    (bend,), (shape,) = placed.bends, placed.shapes
     assert shape.inside.buffer(1e-6).contains(shapely.LineString(bend.line))
     drawing = placed.drawing()
     assert "90\u00b0" in {text.text for text in drawing.texts}
@@ -297,7 +292,7 @@ def test_bends_are_drawn_where_their_piece_is_placed():
 def test_nested_pieces_are_apart_and_move_rigidly(kind, page):
     pattern = gores(7, 8, radius=45.0, kind=kind, page=page)
     placed = nested(pattern)
-    cut = [shape.cut for shape in shapes_of(placed)]
+    cut = [shape.cut for shape in placed.shapes]
     gaps = [first.distance(second) for first, second in combinations(cut, 2)]
     assert min(gaps) >= GAP - 1e-9
     assert np.min([shape.bounds[:2] for shape in cut]) >= 1 - 1e-9
@@ -315,18 +310,18 @@ def test_nested_pieces_are_apart_and_move_rigidly(kind, page):
 
 def test_pieces_that_fit_on_pages_cross_no_border():
     placed = nested(gores(12, 8, radius=60.0, page="A4"))
-    boxes = np.array([shape.cut.bounds for shape in shapes_of(placed)])
+    boxes = np.array([shape.cut.bounds for shape in placed.shapes])
     assert (boxes[:, 0] // 190 == boxes[:, 2] // 190).all()
     assert (boxes[:, 1] // 277 == boxes[:, 3] // 277).all()
 
 
 def test_a_piece_wider_than_the_roll_is_an_error():
-    with pytest.raises(OptionError, match=r"a piece is 74 mm wide and the roll 58 mm without its margins"):
-        nested(two_pieces(page="roll:80mm"))
+    with pytest.raises(OptionError, match=r"a piece is 120 mm wide and the roll 98 mm without its margins"):
+        nested(two_pieces(page="roll:120mm", allowance=30.0))
 
 
 def test_a_roll_takes_pieces_of_nets_at_any_angle():
-    long = Pattern("sheet", sheet(200.0, 20.0), 1.0, settings={"page": "roll:60mm"})
+    long = Pattern("sheet", sheet(200.0, 80.0), 1.0, settings={"page": "roll:120mm"})
     assert nested(long).report()["sheet_height"] > 200
 
 
@@ -347,7 +342,7 @@ def test_a_large_pattern_is_drawn_on_one_page():
     mesh = polyhedra.cube()
     large = coneflat.pattern(mesh.vertices, mesh.faces, kind="net", height="100m", page="none")
     assert large.drawing().width > 2e5
-    assert shapely.area(shapes_of(large)[0].cut) >= 6e10
+    assert shapely.area(large.shapes[0].cut) >= 6e10
 
 
 def test_the_grain_points_up():
@@ -380,7 +375,7 @@ def slotted(width: float) -> Pattern:
 def test_a_slot_that_allowances_fill_is_noted(slot, allowance):
     pattern = slotted(slot)
     notes = [*notes_on_gaps(pattern.surface, pattern.borders, Finish(allowance))]
-    (shape,) = shapes_of(replace(pattern, settings={"allowance": allowance}))
+    (shape,) = replace(pattern, settings={"allowance": allowance}).shapes
     is_filled = not len(shape.cut.interiors)
     assert len(notes) == is_filled == (slot < 2 * allowance)
     if is_filled:
@@ -391,3 +386,24 @@ def test_a_slot_that_allowances_fill_is_noted(slot, allowance):
 def test_corners_and_darts_are_no_gaps():
     for pattern in (two_pieces("cloth"), gores(4, 6)):
         assert not [*notes_on_gaps(pattern.surface, pattern.borders, Finish(7.0))]
+
+
+@pytest.mark.parametrize(
+    ("settings", "note"),
+    [
+        ({}, None),
+        ({"allowance": 100.0}, "1 seam of 1 is shorter than its allowance of 100 mm"),
+        ({"seam_allowances": "A=90mm"}, "1 seam of 1 is shorter than its allowance of 90 mm"),
+        ({"allowance": 100.0, "seam_allowances": "A=5mm"}, None),
+    ],
+)
+def test_seams_are_short_if_their_own_allowance_is_wider(settings, note):
+    pattern = two_pieces(**settings)
+    notes = [*notes_on_short_seams(pattern.seams, pattern.finish)]
+    assert [text.partition(":")[0] for text in notes] == ([] if note is None else [note])
+
+
+def test_several_short_seams_are_counted():
+    around = gores(4, 4, radius=40.0, allowance=200.0, seam_allowances="B=150mm,C=1mm")
+    (note,) = notes_on_short_seams(around.seams, around.finish)
+    assert note.startswith("3 seams of 4 are shorter than their allowances of up to 200 mm: ")

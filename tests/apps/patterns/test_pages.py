@@ -8,18 +8,17 @@ from math import ceil
 import numpy as np
 import polyhedra
 import pytest
-from flat_pieces import gores, sheet, two_pieces
+from flat_pieces import annulus, gores, sheet, two_pieces
 
 import coneflat
 from coneflat import Pattern
-from coneflat.apps.patterns.drawing.drawing import Drawing, Line
 from coneflat.apps.patterns.drawing.labels import CHARACTER_WIDTH, box_of
+from coneflat.apps.patterns.drawing.tiling import tiles_of
 from coneflat.apps.patterns.pages.assembly import pattern_pages
 from coneflat.apps.patterns.pages.guide import CHARACTER
 from coneflat.apps.patterns.pages.nesting import nested
-from coneflat.apps.patterns.pages.pages import cut_shapes, page_map, ruler, tiled
-from coneflat.apps.patterns.pages.tiling import tiles_of
-from coneflat.apps.patterns.papers import PAGE_SIZES, Paper
+from coneflat.apps.patterns.pages.pages import page_map, ruler
+from coneflat.apps.patterns.papers import LONGEST, MARGIN, PAGE_SIZES, RULER, Paper
 from coneflat.errors import OptionError
 
 shapely = pytest.importorskip("shapely")
@@ -30,8 +29,11 @@ def square(side: float, low=(1.0, 1.0)):
 
 
 def pages_of(pattern):
-    paper = Paper.of(pattern.settings["page"])
-    return pattern_pages(pattern, pattern.drawing(), paper, "toy"), paper
+    return pattern_pages(pattern, "toy")
+
+
+def tile_pages(pattern):
+    return [page for page in pages_of(pattern) if page.content is not None]
 
 
 @pytest.mark.parametrize("name", PAGE_SIZES)
@@ -41,9 +43,11 @@ def test_papers_have_a_size(name):
     assert paper.inner_width == pytest.approx(paper.width - 20)
 
 
-@pytest.mark.parametrize("name", ["A9", "roll", "roll:", "roll:3mm", "roll:900kg", "letterbox", ""])
+@pytest.mark.parametrize(
+    "name", ["A9", "roll", "roll:", "roll:3mm", "roll:119mm", "roll:5.1m", "roll:900kg", "letterbox", ""]
+)
 def test_other_papers_are_errors(name):
-    with pytest.raises(OptionError, match="page must be A0, A1,"):
+    with pytest.raises(OptionError, match="page must be A0, A1, .* or a roll of 120 to 5080 mm such as"):
         Paper.of(name)
 
 
@@ -98,7 +102,7 @@ def test_each_point_of_a_line_is_visible_on_a_page_at_its_true_size():
     pattern = nested(Pattern("sheet", sheet(500.0, 350.0), 1.0, settings={"page": "A4"}))
     drawing = pattern.drawing()
     seen = {}
-    for page in tiled(drawing, Paper.of("A4"), "toy"):
+    for page in tile_pages(pattern):
         low, high = page.window
         assert (high - low).tolist() == pytest.approx([190, 277])
         for line in page.content.lines:
@@ -128,7 +132,7 @@ def test_nothing_is_outside_of_a_page(kind, page):
         pattern = coneflat.pattern(side.vertices, side.faces, kind=kind, height="30mm", page=page)
     notes = tuple(f"note {i}: {'some words about it, ' * 4}and more" for i in range(3))
     pattern, share = nested(replace(pattern, notes=notes)), CHARACTER / CHARACTER_WIDTH
-    for sheet_of_paper in pattern_pages(pattern, pattern.drawing(), Paper.of(page), LONG):
+    for sheet_of_paper in pattern_pages(pattern, LONG):
         drawing = sheet_of_paper.drawing
         box = shapely.box(0, 0, drawing.width, drawing.height)
         # Boxes of texts are rather too wide; the mean width of characters is that of longer texts.
@@ -150,11 +154,9 @@ def test_rulers_have_their_length():
 
 
 def test_the_map_shows_each_page_within_its_place():
-    drawing = nested(gores(12, 8, radius=120.0, page="A4")).drawing()
-    paper = Paper.of("A4")
-    shown = page_map(drawing, paper, np.array([10.0, 20.0]), np.array([150.0, 80.0]))
-    names = [tile.name for tile in tiles_of(cut_shapes(drawing), drawing.width, drawing.height, paper)]
-    assert [text.text for text in shown.texts] == names
+    pattern = nested(gores(12, 8, radius=120.0, page="A4"))
+    shown = page_map(pattern.drawing(), pattern.tiles, np.array([10.0, 20.0]), np.array([150.0, 80.0]))
+    assert [text.text for text in shown.texts] == [tile.name for tile in pattern.tiles]
     points = np.vstack([line.points for line in shown.lines])
     assert (points.min(axis=0) >= [10 - 1e-9, 20 - 1e-9]).all()
     assert (points.max(axis=0) <= [160 + 1e-9, 100 + 1e-9]).all()
@@ -163,7 +165,7 @@ def test_the_map_shows_each_page_within_its_place():
 @pytest.mark.parametrize("page", ["A4", "A5", "letter"])
 def test_the_guide_comes_first_and_lists_all_pieces_and_seams(page):
     pattern = nested(gores(9, 8, radius=50.0, page=page))
-    pages, paper = pages_of(pattern)
+    pages, paper = pages_of(pattern), pattern.paper
     texts = [text.text for page in pages if page.content is None for text in page.drawing.texts]
     assert {seam.name for seam in pattern.seams} <= set(texts)
     assert any(text.startswith("gores: 9 pieces, 9 seams") for text in texts)
@@ -194,13 +196,13 @@ def test_the_guide_shows_the_model_upright(tmp_path, axis, upward):
     write_stl(path, polyhedra.hull([[x, y, z] for x in (-1, 1) for y in (-2, 2) for z in (-9, 9)]))
     pattern = coneflat.pattern(path, kind="net", height="100mm", axis=axis, repair=True)
     assert pattern.settings["axis"] == tuple(np.eye(3)[upward])
-    image = pages_of(pattern)[0][0].pictures[0].pixels
+    image = pages_of(pattern)[0].pictures[0].pixels
     rows, columns = ((image < 250).any(axis=2).any(axis=axis).sum() for axis in (1, 0))
     assert (rows > columns) == (upward == 2)
 
 
 def test_long_tables_go_on_to_further_pages():
-    pages, _ = pages_of(nested(gores(150, 2, radius=60.0, page="A4", allowance=0.0)))
+    pages = pages_of(nested(gores(150, 2, radius=60.0, page="A4", allowance=0.0)))
     tables = [page for page in pages if page.content is None][1:]
     assert len(tables) > 1
     rows = [text.text for page in tables for text in page.drawing.texts]
@@ -210,7 +212,7 @@ def test_long_tables_go_on_to_further_pages():
 
 @pytest.mark.parametrize("page", ["roll:600mm", "none"])
 def test_a_roll_has_one_page_with_a_ruler_and_the_guide_last(page):
-    pages, _ = pages_of(nested(gores(12, 8, radius=100.0, page=page)))
+    pages = pages_of(nested(gores(12, 8, radius=100.0, page=page)))
     assert pages[0].content is not None
     assert [page.content is None for page in pages[1:]] == [True] * (len(pages) - 1)
     assert (pages[-1].drawing.width, pages[-1].drawing.height) == PAGE_SIZES["A4"]
@@ -220,23 +222,114 @@ def test_a_roll_has_one_page_with_a_ruler_and_the_guide_last(page):
         assert pages[0].drawing.width <= 600 + 1e-9
 
 
+STRIP = sheet(100.0, 5200.0)
+
+
 def test_a_page_larger_than_a_pdf_allows_is_an_error():
-    outline = np.array([[0.0, 0], [6000, 0], [6000, 100], [0, 100]])
-    drawing = Drawing(6000.0, 100.0, (Line("cut", outline, is_closed=True),))
+    pattern = Pattern("sheet", STRIP, 1.0, settings={"page": "none"})
     with pytest.raises(
-        OptionError, match="a page of 6000 x 100 mm is larger than the 5080 mm that a PDF allows"
+        OptionError, match="a page of 121 x 5241 mm is larger than the 5080 mm that a PDF allows"
     ):
-        tiled(drawing, Paper.of("none"), "toy")
-    assert len(tiled(drawing, Paper.of("A4"), "toy")) == 34
+        pages_of(pattern)
+    assert pattern.report()["pages"] == 1
+
+
+@pytest.mark.parametrize("height", [5030.0, 5048.0, 5060.0, 5200.0])
+def test_pages_of_rolls_are_not_larger_than_a_pdf_allows(height):
+    pattern = nested(Pattern("sheet", sheet(100.0, height), 1.0, settings={"page": "roll:300mm"}))
+    assert max(page.drawing.height for page in pages_of(pattern)) <= LONGEST
+    # The longest page without its margins and its ruler has 5,040 mm, and the edge of the sheet is 1 mm wide.
+    assert len(tile_pages(pattern)) == (1 if height <= 5038 else 2)
+
+
+def test_the_last_page_of_a_roll_ends_with_the_pattern():
+    pattern = nested(Pattern("sheet", STRIP, 1.0, settings={"page": "roll:300mm"}))
+    last, first = tile_pages(pattern)
+    # The sheet has an edge of 1 mm; pages have margins and a ruler, 40 mm, and overlap by 10 mm.
+    assert first.drawing.height + last.drawing.height == pytest.approx(5200 + 2 + 2 * 40 + 10)
+
+
+@pytest.mark.parametrize("page", ["roll:120mm", "roll:300mm", "none", "A5", "letter"])
+def test_rulers_are_on_the_page(page):
+    pattern = nested(Pattern("sheet", sheet(10.0, 10.0), 1.0, settings={"page": page}))
+    pages = pages_of(pattern)
+    assert any(np.ptp(line.points[:, 0]) == RULER for page in pages for line in page.drawing.lines)
+    for page in pages:
+        printed = shapely.box(MARGIN, MARGIN, page.drawing.width - MARGIN, page.drawing.height - MARGIN)
+        assert all(printed.covers(shapely.LineString(line.points)) for line in page.drawing.lines)
+
+
+def ring(page):
+    return Pattern("sheet", annulus(), 1.0, settings={"page": page})
+
+
+@pytest.mark.parametrize(
+    ("pattern", "count"),
+    [
+        (ring("A4"), None),
+        (ring("A2"), None),
+        (ring("none"), 1),
+        (Pattern("sheet", STRIP, 1.0, settings={"page": "roll:300mm"}), 2),
+        (Pattern("sheet", STRIP, 1.0, settings={"page": "A4"}), 20),
+        (two_pieces(page="A5"), 2),
+    ],
+    ids=["ring", "A2", "none", "roll", "strip", "cloth"],
+)
+def test_the_report_counts_the_pages_that_are_printed(pattern, count):
+    placed = nested(pattern)
+    pages = tile_pages(placed)
+    assert placed.report()["pages"] == len(pages) == len(placed.tiles)
+    assert count in (None, len(pages))
+
+
+def test_holes_of_pieces_are_on_no_page():
+    for page in tile_pages(nested(ring("A4"))):
+        window = shapely.box(*page.window.ravel())
+        assert any(shapely.LinearRing(line.points).intersects(window) for line in page.content.lines)
+
+
+def pages_in_table(pattern):
+    """The pages of each piece in the table of the guide, by its number."""
+    texts = [text for page in pages_of(pattern) if page.content is None for text in page.drawing.texts]
+    heading = next(text for text in texts if text.text == "pages")
+    number = next(text for text in texts if text.text == "number")
+    rows = {float(text.place[1]): text.text for text in texts if text.place[0] == number.place[0]}
+    return {
+        rows[float(text.place[1])]: text.text
+        for text in texts
+        if text.place[0] == heading.place[0] and text is not heading
+    }
+
+
+def test_the_guide_lists_the_pages_of_pieces_with_their_allowances():
+    # The first two pages end at 370 mm. The piece of 330 mm begins at 21 mm, and its allowance ends at 371 mm.
+    surface = sheet(330.0, 60.0)
+    surface = replace(surface, points=surface.points + 21.0)
+    pattern = Pattern("cloth", surface, 1.0, settings={"page": "A4", "allowance": 20.0})
+    assert pages_in_table(pattern) == {"1": "A1 to A3"}
+    assert pages_in_table(replace(pattern, settings={"page": "A4", "allowance": 0.0})) == {"1": "A1 to A2"}
+
+
+@pytest.mark.parametrize(
+    ("settings", "text"),
+    [
+        ({}, "the seam allowance of 7 mm is included"),
+        ({"allowance": 0.0}, "no seam allowance"),
+        ({"allowance": 0.0, "seam_allowances": "A=9mm"}, "the seam allowances of 0 to 9 mm are included"),
+        ({"seam_allowances": "A=9mm,hem=9mm"}, "the seam allowance of 9 mm is included"),
+    ],
+)
+def test_the_guide_gives_the_widths_of_all_allowances(settings, text):
+    lines = [line.text for line in pages_of(two_pieces(**settings))[0].drawing.texts]
+    assert any(line.startswith(text) for line in lines)
+    assert text in " ".join(lines).partition("Cut out")[2]
+
+
+def test_the_guide_lists_the_page_of_each_piece():
+    assert pages_in_table(nested(two_pieces(page="A5"))) == {"1": "A1", "2": "A2"}
 
 
 def test_a_pattern_of_one_page_has_no_marks_for_joining():
-    pages, _ = pages_of(nested(two_pieces(page="A3")))
+    pages = pages_of(nested(two_pieces(page="A3")))
     assert [text.text for text in pages[-1].drawing.texts] == ["toy"]
     assert not pages[-1].drawing.lines
-
-
-def test_cut_lines_that_cross_themselves_do_not_stop_tiling():
-    bow = np.array([[0.0, 0], [100, 0], [100, 100], [50, -1e-3], [0, 100]])
-    drawing = Drawing(110.0, 110.0, (Line("cut", bow + 5, is_closed=True),))
-    assert all(shape.is_valid for shape in cut_shapes(drawing))

@@ -2,26 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...base import FloatArray, component_at_work, plural, timing, warns
+from ...base import FloatArray, component_at_work, timing, warns
 from ...options import read_options, settings, takes
 from .cloth.cloth import cloth_pieces
-from .drawing.gaps import notes_on_gaps
-from .finish import Finish
+from .drawing.gaps import notes_on_gaps, notes_on_short_seams
 from .gores.gores import best_axis, cut_gores
 from .model import Model, read_model
 from .net.net import unfold_net
 from .net.tabs import glue_tabs
 from .options import PatternOptions
-from .pages.nesting import grain_up, nested
+from .pages.nesting import nested
 from .pieces.cut_surface import piece_areas
 from .pieces.development import Development
+from .pieces.grain import grain_up
 from .pieces.numbering import order_around
 from .result import Pattern
 from .sheet.sheet import develop_sheet
@@ -127,17 +127,7 @@ def _placed(model: Model, developed: Development, options: PatternOptions) -> Pa
     if options.kind == "net" and options.tabs > 0:
         glued = glue_tabs(developed.surface, result.borders, options.tabs)
         result = replace(result, tabs=glued.tabs, notes=(*result.notes, *glued.notes))
-    finish = Finish.of(result.kind, result.settings)
-    notes = *_notes_on_short_seams(result), *notes_on_gaps(result.surface, result.borders, finish)
+    notes = [*notes_on_gaps(result.surface, result.borders, result.finish)]
+    if result.is_sewn:
+        notes = [*notes_on_short_seams(result.seams, result.finish), *notes]
     return nested(replace(result, notes=(*result.notes, *notes)))
-
-
-def _notes_on_short_seams(result: Pattern) -> Iterator[str]:
-    """Yield a note on the seams that are shorter than the allowance is wide, as they are hard to sew."""
-    width = Finish.of(result.kind, result.settings).allowance
-    count = sum(min(seam.lengths) < width for seam in result.seams)
-    if count and result.is_sewn:
-        yield (
-            f"{plural(count, 'seam')} of {len(result.seams):,} are shorter than the {width:g} mm of the allowance: "
-            "more strain, a larger model or a smoother mesh needs fewer."
-        )

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, ClassVar
 from ...errors import OptionError
 from ...options import Choice, Direction, Edges, Number, RunOptions, declarations, option
 from .finish import MAX_ALLOWANCE, Allowances, read_allowances
-from .papers import PaperName
+from .papers import DEFAULT_PAPER, PaperName
 from .units import MILLIMETRES, Length, Percentage
 
 if TYPE_CHECKING:
@@ -77,7 +77,7 @@ class PatternOptions(RunOptions):
     seam_allowances: str = option("", Allowances())
     corners: str = option("mitred", Choice(("mitred", "round")))
     tabs: float = option(8.0, Length())
-    page: str = option("A4", PaperName())
+    page: str = option(DEFAULT_PAPER, PaperName())
 
     def __post_init__(self) -> None:
         if self.height is not None and (self.unit is not None or self.scale != 1.0):

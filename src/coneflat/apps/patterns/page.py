@@ -129,14 +129,14 @@ def _folds(pattern: Pattern) -> FoldLines:
     ends = np.concatenate([surface.points[pattern.folds], lines])
     angles = np.concatenate([pattern.fold_angles, [bend.angle for bend in bends]])
     bent = [[_place_on_model(surface, bend.piece, point) for point in bend.line] for bend in bends]
-    folded = surface.mesh.vertices[_vertex_of_points(surface)[pattern.folds]]
+    folded = surface.mesh.vertices[surface.vertex_of_point[pattern.folds]]
     places = np.concatenate([folded, np.array(bent).reshape(-1, 2, 3)])
     return FoldLines(places, _as_uv(surface, ends), angles > 0)
 
 
 def _place_on_model(surface: CutSurface, piece: int, point: FloatArray) -> FloatArray:
     """Return (3,) the place on the model of a point of a piece; beside the piece, in the plane of its next triangle."""
-    triangles = np.flatnonzero(surface.pieces == piece)
+    triangles = surface.triangles_of_pieces[piece]
     triangle = triangles[_depths(surface.places[triangles], point).argmax()]
     origin, *corners = surface.places[triangle]
     weights = np.linalg.solve((np.array(corners) - origin).T, point - origin)
@@ -153,15 +153,8 @@ def _seam_text(seam: Seam, is_sewn: bool) -> str:
 
 def _tips(pattern: Pattern) -> IntArray:
     """Return the vertices at the tips of darts."""
-    vertex = _vertex_of_points(pattern.surface)
+    vertex = pattern.surface.vertex_of_point
     return np.unique(vertex[[dart.tip for dart in pattern.darts if dart.tip is not None]])
-
-
-def _vertex_of_points(surface: CutSurface) -> IntArray:
-    """Return (u,) the vertex of the model of each point of the pieces."""
-    vertex = np.empty(len(surface.points), dtype=np.int64)
-    vertex[surface.corners] = surface.mesh.faces
-    return vertex
 
 
 def _anchors(pattern: Pattern) -> IntArray:
@@ -171,7 +164,7 @@ def _anchors(pattern: Pattern) -> IntArray:
     for piece, loops in enumerate(pattern.borders.loops):
         polygon = polygon_of([surface.points[tails(surface, loop)] for loop in loops])
         centre = np.asarray(shapely().maximum_inscribed_circle(polygon).coords[0])
-        triangles = np.flatnonzero(surface.pieces == piece)
+        triangles = surface.triangles_of_pieces[piece]
         anchors.append(int(triangles[_depths(surface.places[triangles], centre).argmax()]))
     return np.array(anchors)
 

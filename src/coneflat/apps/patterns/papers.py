@@ -31,6 +31,12 @@ MARGIN, OVERLAP = 10.0, 10.0
 EDGE = 1.0
 #: The longest side of a page of a PDF, mm: 14,400 points.
 LONGEST = 5080.0
+#: Length of the ruler, mm, and height of the strip for it below what is on a roll or on a page as large as the pattern.
+RULER, RULER_STRIP = 100, 20.0
+#: The narrowest page: the ruler and the margins, mm.
+NARROWEST = RULER + 2 * MARGIN
+#: The paper by default.
+DEFAULT_PAPER = "A4"
 _ROLL = "roll:"
 
 
@@ -53,7 +59,7 @@ class Paper:
         """Return the paper of a name.
 
         Raises:
-            OptionError: there is none of this name, or a roll is narrower than its margins.
+            OptionError: there is none of this name, or a roll is narrower than the ruler or wider than a PDF allows.
         """
         by_name = {size.lower(): size for size in PAGE_SIZES}
         if name.lower() in by_name:
@@ -62,9 +68,9 @@ class Paper:
         if name == "none":
             return cls(name)
         width = length_of(name.removeprefix(_ROLL)) if name.startswith(_ROLL) else None
-        if width is None or width <= 2 * MARGIN:
+        if width is None or not NARROWEST <= width <= LONGEST:
             raise OptionError(
-                f"page must be {', '.join(PAGE_SIZES)}, none, or a roll wider than {2 * MARGIN:g} mm such as "
+                f"page must be {', '.join(PAGE_SIZES)}, none, or a roll of {NARROWEST:g} to {LONGEST:g} mm such as "
                 f"roll:900mm, got {short_repr(name)}"
             )
         return cls(name, width)
@@ -76,8 +82,13 @@ class Paper:
 
     @property
     def inner_height(self) -> float:
-        """The height without margins, mm; that of the longest page if it may vary."""
-        return (LONGEST if self.height is None else self.height) - 2 * MARGIN
+        """The height without margins and the ruler, mm; that of the longest page if it may vary."""
+        return (LONGEST if self.height is None else self.height) - self.below - MARGIN
+
+    @property
+    def below(self) -> float:
+        """The height of what is below the printed part of a page, mm: the margin, and the ruler where there is one."""
+        return MARGIN + (RULER_STRIP if self.height is None else 0.0)
 
 
 @dataclass(frozen=True)

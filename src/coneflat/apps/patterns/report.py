@@ -7,11 +7,7 @@ from typing import Any
 import numpy as np
 
 from ...measures import quantile
-from .drawing.allowances import shapely
-from .drawing.shapes import piece_shapes
-from .finish import Finish
-from .pages.tiling import tiles_of
-from .papers import EDGE, Paper
+from .drawing.gaps import short_seams
 from .result import Pattern
 from .units import percentage, text_of_size
 
@@ -25,11 +21,7 @@ PATTERN_MEASURES = (
 
 def report_of(pattern: Pattern) -> dict[str, Any]:
     """Return all measures of a pattern; see `Pattern.report`."""
-    finish = Finish.of(pattern.kind, pattern.settings)
-    shapes = piece_shapes(pattern.surface, pattern.borders, finish, pattern.tabs)
-    cut = [shape.cut for shape in shapes]
-    width, height = (shapely().total_bounds(cut)[2:] + EDGE).tolist()
-    paper = Paper.of(pattern.settings.get("page", "A4"))
+    width, height = pattern.sheet_size
     strains, lengths = np.abs(pattern.strains), pattern.surface.edges.lengths
     stretches = np.abs(pattern.stretches)
     seams = [
@@ -44,7 +36,7 @@ def report_of(pattern: Pattern) -> dict[str, Any]:
         }
         for seam in pattern.seams
     ]
-    area = float(sum(shape.inside.area for shape in shapes))
+    area = float(sum(shape.inside.area for shape in pattern.shapes))
     copies = pattern.counterparts
     return {
         "kind": pattern.kind,
@@ -59,13 +51,13 @@ def report_of(pattern: Pattern) -> dict[str, Any]:
         "strain_mean": float(np.average(strains, weights=lengths)),
         "stretch_max": float(stretches.max()),
         "stretch_p95": quantile(stretches, pattern.surface.edges.double_areas, 0.95),
-        "short_seams": sum(min(seam.lengths) < finish.width(seam.name) for seam in pattern.seams),
-        "piece_area_min": min(shape.inside.area for shape in shapes),
+        "short_seams": len(short_seams(pattern.seams, pattern.finish)),
+        "piece_area_min": min(shape.inside.area for shape in pattern.shapes),
         "area": area,
         "sheet_width": width,
         "sheet_height": height,
-        "sheet_share": float(sum(shape.area for shape in cut)) / (width * height),
-        "pages": len(tiles_of(cut, width, height, paper)) if paper.height is not None else 1,
+        "sheet_share": float(sum(shape.cut.area for shape in pattern.shapes)) / (width * height),
+        "pages": len(pattern.tiles),
         "millimetres_per_unit": pattern.millimetres,
         "each_piece": [
             {
@@ -122,7 +114,7 @@ def rows_of(pattern: Pattern, report: dict[str, Any] | None = None) -> list[tupl
             f"{report['sheet_width']:.0f} x {report['sheet_height']:.0f} mm",
             f"{100 * report['sheet_share']:.0f} % of it covered by pieces",
         ),
-        ("pages", f"{report['pages']}", f"{pattern.settings.get('page', 'A4')}, without the assembly guide"),
+        ("pages", f"{report['pages']}", f"{pattern.paper.name}, without the assembly guide"),
     ]
 
 
@@ -132,8 +124,7 @@ def piece_sizes(pattern: Pattern) -> list[tuple[float, float, float]]:
     corners = surface.places
     sides = corners[:, 1:] - corners[:, :1]
     areas = (sides[:, 0, 0] * sides[:, 1, 1] - sides[:, 0, 1] * sides[:, 1, 0]) / 2
-    for piece in range(pattern.piece_count):
-        is_inside = surface.pieces == piece
-        width, height = np.ptp(corners[is_inside].reshape(-1, 2), axis=0).tolist()
-        sizes.append((width, height, float(areas[is_inside].sum())))
+    for triangles in surface.triangles_of_pieces:
+        width, height = np.ptp(corners[triangles].reshape(-1, 2), axis=0).tolist()
+        sizes.append((width, height, float(areas[triangles].sum())))
     return sizes

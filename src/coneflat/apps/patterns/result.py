@@ -12,10 +12,14 @@ from typing import Any
 import numpy as np
 
 from ...base import EntryPoint, FloatArray, IntArray, plural
+from .drawing.allowances import shapely
 from .drawing.counterparts import Counterparts
 from .drawing.drawing import Drawing
-from .finish import SEWN
+from .drawing.shapes import PieceShape, piece_shapes
+from .drawing.tiling import Tile, tiles_of
+from .finish import HEM, SEWN, Finish
 from .net.tabs import Tab
+from .papers import DEFAULT_PAPER, EDGE, Paper
 from .pieces.borders import Borders, Seam, find_borders
 from .pieces.cut_surface import CutSurface, largest_stretches
 from .sheet.bends import Bend, find_bends
@@ -103,6 +107,38 @@ class Pattern:
     def counterparts(self) -> Counterparts:
         """Which pieces have the same shape, and which are mirror images of each other."""
         return _COUNTERPARTS(self)
+
+    @cached_property
+    def finish(self) -> Finish:
+        """The widths of the seam allowances, and their corners."""
+        return Finish.of(self.kind, self.settings)
+
+    @property
+    def allowances(self) -> tuple[float, ...]:
+        """The widths of the seam allowances of all sides, mm, each once, the smallest first."""
+        names = [seam.name for seam in self.seams] + ([HEM] if self.borders.hems else [])
+        return tuple(sorted({self.finish.width(name) for name in names}))
+
+    @cached_property
+    def paper(self) -> Paper:
+        """The paper of a PDF."""
+        return Paper.of(self.settings.get("page", DEFAULT_PAPER))
+
+    @cached_property
+    def shapes(self) -> tuple[PieceShape, ...]:
+        """The pieces as they are cut out, with allowances and tabs."""
+        return tuple(piece_shapes(self.surface, self.borders, self.finish, self.tabs))
+
+    @cached_property
+    def sheet_size(self) -> tuple[float, float]:
+        """The width and the height of the sheet on which the pieces lie side by side, mm."""
+        width, height = (shapely().total_bounds([shape.cut for shape in self.shapes])[2:] + EDGE).tolist()
+        return width, height
+
+    @cached_property
+    def tiles(self) -> tuple[Tile, ...]:
+        """The parts of the sheet that are printed on pages."""
+        return tuple(tiles_of([shape.cut for shape in self.shapes], *self.sheet_size, self.paper))
 
     @cached_property
     def strains(self) -> FloatArray:

@@ -16,10 +16,10 @@ from ....base import IntArray, Unmet, part_of_work, plural
 from ....linalg import MultiGraph
 from ..model import Model
 from ..options import PatternOptions
-from ..pages.nesting import grain_up
 from ..pieces.borders import find_borders
 from ..pieces.cut_surface import CutSurface
 from ..pieces.development import Development
+from ..pieces.grain import grain_up
 from ..pieces.relaxing import excess
 from ..pieces.strain import Stretch
 from ..units import percentage

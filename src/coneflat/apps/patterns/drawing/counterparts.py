@@ -10,9 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ....base import ComplexArray, FloatArray
-from ..finish import Finish
 from .allowances import shapely
-from .shapes import PieceShape, piece_shapes
+from .shapes import PieceShape
 
 if TYPE_CHECKING:
     from ..result import Pattern
@@ -52,8 +51,7 @@ def counterparts_of(pattern: Pattern) -> Counterparts:
 
     Pieces with a grain have the same shape only if the grain is the same, too.
     """
-    finish = Finish.of(pattern.kind, pattern.settings)
-    shapes = piece_shapes(pattern.surface, pattern.borders, finish, pattern.tabs)
+    shapes = pattern.shapes
     equal: list[int | None] = [None] * len(shapes)
     mirrored: list[int | None] = [None] * len(shapes)
     for group in _classes(shapes, pattern.has_grain):

@@ -1,16 +1,16 @@
-"""Gaps in the border of a piece, such as slots, that are narrower than the two allowances beside them."""
+"""Allowances without room: in gaps that are narrower than the two beside them, such as slots, and at short seams."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from ....base import FloatArray, IntArray, list_some
+from ....base import FloatArray, IntArray, list_some, plural
 from ....mesh import NEXT, PREVIOUS
 from ..finish import HEM, Finish
-from ..pieces.borders import Borders
+from ..pieces.borders import Borders, Seam
 from ..pieces.cut_surface import CutSurface
 from .allowances import shapely
 from .shapes import allowance_of_halfedges
@@ -85,6 +85,34 @@ def notes_on_gaps(surface: CutSurface, borders: Borders, finish: Finish) -> Iter
             f"down to {min(gaps):.1f} mm between parts of a piece are filled by the allowances of both sides; make the "
             f"allowance narrower there"
         )
+
+
+def short_seams(seams: Sequence[Seam], finish: Finish) -> list[Seam]:
+    """Return the seams that are shorter than their allowance is wide."""
+    return [seam for seam in seams if min(seam.lengths) < finish.width(seam.name)]
+
+
+def notes_on_short_seams(seams: Sequence[Seam], finish: Finish) -> Iterator[str]:
+    """Yield a sentence if seams are shorter than their allowance is wide, as they are hard to sew.
+
+    Args:
+        seams: the seams.
+        finish: the widths of the allowances.
+    """
+    short = [finish.width(seam.name) for seam in short_seams(seams, finish)]
+    if not short:
+        return
+    allowance = (
+        f"is shorter than its allowance of {short[0]:g} mm"
+        if len(short) == 1
+        else f"are shorter than their allowance of {short[0]:g} mm"
+        if min(short) == max(short)
+        else f"are shorter than their allowances of up to {max(short):g} mm"
+    )
+    yield (
+        f"{plural(len(short), 'seam')} of {len(seams):,} {allowance}: more strain, a larger model or a smoother mesh "
+        "needs fewer."
+    )
 
 
 def _sides(borders: Borders) -> Iterator[tuple[str, IntArray]]:

@@ -8,10 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ....base import FloatArray, IntArray, list_some
+from ....base import FloatArray, list_some
 from ..finish import HEM, Finish
-from ..pages.tiling import tiles_of
-from ..papers import EDGE, Paper
 from ..result import Pattern
 from .allowances import shapely
 from .drawing import Drawing, Line, Text
@@ -19,7 +17,7 @@ from .labels import Labels
 from .notches import notches_of
 from .piece_texts import add_angle, add_grain, add_number, add_seam_name
 from .seam_names import names_of
-from .shapes import PieceShape, fold_of_tab, piece_shapes
+from .shapes import PieceShape, fold_of_tab
 
 if TYPE_CHECKING:
     from shapely import Polygon
@@ -36,14 +34,12 @@ def drawing_of(pattern: Pattern) -> Drawing:
     Raises:
         OptionError: options of the pattern cannot be met, or shapely is not installed.
     """
-    finish = Finish.of(pattern.kind, pattern.settings)
-    shapes = piece_shapes(pattern.surface, pattern.borders, finish, pattern.tabs)
+    finish, shapes = pattern.finish, pattern.shapes
     lines = [*_cut_lines(shapes), *_seam_lines(pattern, finish), *_tab_folds(pattern), *_folds(pattern)]
     lines += [Line("mark", ends) for _, ends in _notches(pattern, finish)]
     lines += _dart_tips(pattern)
-    width, height = np.max([shape.cut.bounds[2:] for shape in shapes], axis=0) + EDGE
-    rooms = Rooms.of(shapes, float(width), float(height))
-    points, piece_of_point = pattern.surface.points, _piece_of_points(pattern)
+    rooms = Rooms.of(shapes, *pattern.sheet_size)
+    points, piece_of_point = pattern.surface.points, pattern.surface.piece_of_point
     for dart in pattern.darts:
         rooms.inside[dart.sides[0].piece].cover(shapely().Point(points[dart.tip]).buffer(TIP_RADIUS))
     for piece, ends in _notches(pattern, finish):
@@ -51,7 +47,7 @@ def drawing_of(pattern: Pattern) -> Drawing:
             room.cover(shapely().LineString(ends))
     for ends in pattern.folds:
         rooms.inside[piece_of_point[ends[0]]].avoid(shapely().LineString(points[ends]))
-    pages = _pages(pattern, shapes, float(width), float(height))
+    pages = _pages(pattern)
     for piece, room in enumerate(rooms.inside):
         lines += add_number(room, rooms.outside, piece, shapes[piece].inside.area, pages)
         if pattern.has_grain:
@@ -71,7 +67,7 @@ def drawing_of(pattern: Pattern) -> Drawing:
         if not unnamed
         else (f"no room for the name of the seam {list_some(unnamed)}: see the table of seams",)
     )
-    return Drawing(float(width), float(height), tuple(lines), tuple(rooms.texts()), notes)
+    return Drawing(*pattern.sheet_size, tuple(lines), tuple(rooms.texts()), notes)
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,13 +98,9 @@ class Rooms:
             yield from room.texts
 
 
-def _pages(pattern: Pattern, shapes: Sequence[PieceShape], width: float, height: float) -> list[Polygon]:
+def _pages(pattern: Pattern) -> list[Polygon]:
     """Return the rectangles of the pages onto which a pattern is tiled."""
-    paper = Paper.of(pattern.settings.get("page", "A4"))
-    if paper.height is None:
-        return []
-    tiles = tiles_of([shape.cut for shape in shapes], width, height, paper)
-    return [shapely().box(*tile.low, *tile.high) for tile in tiles]
+    return [shapely().box(*tile.low, *tile.high) for tile in pattern.tiles]
 
 
 def _cut_lines(shapes: Sequence[PieceShape]) -> Iterator[Line]:
@@ -153,10 +145,3 @@ def _dart_tips(pattern: Pattern) -> Iterator[Line]:
         tip = pattern.surface.points[dart.tip]
         yield Line("mark", tip + circle, is_closed=True)
         yield from (Line("mark", tip + arm) for arm in (across, across[:, ::-1]))
-
-
-def _piece_of_points(pattern: Pattern) -> IntArray:
-    surface = pattern.surface
-    piece = np.zeros(len(surface.points), dtype=np.int64)
-    piece[surface.corners] = surface.pieces[:, None]
-    return piece

@@ -7,7 +7,6 @@ from pathlib import Path
 
 from ....io import checked_target
 from ..pages.assembly import pattern_pages
-from ..papers import Paper
 from ..result import Pattern
 from .dxf import write_dxf
 from .pdf import write_pdf
@@ -29,13 +28,11 @@ def check_pattern_output(path: str | PathLike[str]) -> Path:
 def write_pattern(pattern: Pattern, path: str | PathLike[str]) -> Path:
     """Write a pattern, and return the path; see `Pattern.save`."""
     path = check_pattern_output(path)
-    drawing = pattern.drawing()
     match path.suffix.lower():
         case ".svg":
-            write_svg(drawing, path)
+            write_svg(pattern.drawing(), path)
         case ".dxf":
-            write_dxf(drawing, path)
+            write_dxf(pattern.drawing(), path)
         case _:
-            paper = Paper.of(pattern.settings.get("page", "A4"))
-            write_pdf(pattern_pages(pattern, drawing, paper, path.stem), path, path.stem)
+            write_pdf(pattern_pages(pattern, path.stem), path, path.stem)
     return path

@@ -2,25 +2,21 @@
 
 from __future__ import annotations
 
-from ..drawing.drawing import Drawing
-from ..papers import Paper
 from ..result import Pattern
 from .guide import guide_pages
 from .pages import Page, tiled
 
 
-def pattern_pages(pattern: Pattern, drawing: Drawing, paper: Paper, title: str) -> list[Page]:
+def pattern_pages(pattern: Pattern, title: str) -> list[Page]:
     """Return the pages of a pattern: the assembly guide first on paper of a given size, else last.
 
     Args:
         pattern: the pattern.
-        drawing: its drawing.
-        paper: the paper.
         title: text in the margins.
 
     Raises:
         OptionError: a page as large as the pattern would be larger than a PDF allows.
     """
-    tiles = tiled(drawing, paper, title)
-    guide = guide_pages(pattern, drawing, paper, title)
-    return [*guide, *tiles] if paper.height is not None else [*tiles, *guide]
+    tiles = tiled(pattern.drawing(), pattern.tiles, pattern.paper, title)
+    guide = guide_pages(pattern, title)
+    return [*guide, *tiles] if pattern.paper.height is not None else [*tiles, *guide]

@@ -11,16 +11,14 @@ import numpy as np
 from ....base import FloatArray, plural
 from ..drawing.drawing import Drawing, Text
 from ..drawing.labels import fitted_size
-from ..finish import Finish
-from ..papers import IN_INCHES, MARGIN, Paper
+from ..papers import DEFAULT_PAPER, IN_INCHES, MARGIN, Paper
 from ..report import piece_sizes
 from ..result import Pattern
 from ..units import area_text, percentage, text_of_size
-from .pages import Page, Picture, cut_shapes, page_map, ruler
-from .steps import steps_of
+from .pages import Page, Picture, page_map, ruler
+from .steps import allowance_text, steps_of
 from .strain_map import is_strained, strain_map
 from .tables import Table, laid_out
-from .tiling import tiles_of
 from .views import View, eye_and_up, view_of
 
 # Pixels of pictures per millimetre: 200 per inch.
@@ -38,20 +36,18 @@ TEXT_SHARE, HALF, CHARACTER = 0.66, 0.5, 0.76
 SPACE = 5.0
 
 
-def guide_pages(pattern: Pattern, drawing: Drawing, paper: Paper, title: str) -> list[Page]:
-    """Return the pages of the assembly guide of a pattern.
+def guide_pages(pattern: Pattern, title: str) -> list[Page]:
+    """Return the pages of the assembly guide of a pattern, on its paper, or on a page of the default size.
 
     Args:
         pattern: the pattern.
-        drawing: its drawing.
-        paper: the paper of the pattern; the guide of a roll, or of a page as large as the pattern, is on A4.
         title: the title of the first page.
     """
-    own_paper = paper if paper.height is not None else Paper.of("A4")
-    tables = [_piece_table(pattern, drawing, paper), *_seam_tables(pattern)]
+    paper = pattern.paper if pattern.paper.height is not None else Paper.of(DEFAULT_PAPER)
+    tables = [_piece_table(pattern), *_seam_tables(pattern)]
     low = np.array([MARGIN, MARGIN])
-    high = np.array([own_paper.width, own_paper.height], dtype=np.float64) - MARGIN
-    return [*_overview(pattern, drawing, paper, own_paper, title), *_table_pages(tables, low, high)]
+    high = np.array([paper.width, paper.height], dtype=np.float64) - MARGIN
+    return [*_overview(pattern, paper, title), *_table_pages(tables, low, high)]
 
 
 def _table_pages(tables: list[Table], low: FloatArray, high: FloatArray) -> Iterator[Page]:
@@ -60,14 +56,11 @@ def _table_pages(tables: list[Table], low: FloatArray, high: FloatArray) -> Iter
         yield Page(Drawing(float(width), float(height), tuple(lines), tuple(texts)))
 
 
-def _overview(
-    pattern: Pattern, drawing: Drawing, paper: Paper, own_paper: Paper, title: str
-) -> Iterator[Page]:
-    """Yield the first page, and a page of notes if there is no room for them."""
-    width, height = own_paper.inner_width, own_paper.inner_height
-    tiles = tiles_of(cut_shapes(drawing), drawing.width, drawing.height, paper)
-    rulers = ruler(np.array([MARGIN, MARGIN]), own_paper)
-    bottom = MARGIN + (25.0 if own_paper.name in IN_INCHES else 14.0)
+def _overview(pattern: Pattern, paper: Paper, title: str) -> Iterator[Page]:
+    """Yield the first page, and a page of notes if there is no room for them; paper: that of the guide."""
+    width, height = paper.inner_width, paper.inner_height
+    rulers = ruler(np.array([MARGIN, MARGIN]), paper)
+    bottom = MARGIN + (25.0 if paper.name in IN_INCHES else 14.0)
     top = MARGIN + height
     title_size = fitted_size(title, TITLE, width)
     texts = [Text(title, np.array([MARGIN, top - TITLE / 2]), title_size, is_left=True)]
@@ -75,9 +68,9 @@ def _overview(
     texts += _lines_of_text(_summary(pattern), width, top)
     top = min(float(text.place[1]) for text in texts) - SPACE
     # The map is beside the text. Pictures are smaller where steps need their room.
-    has_map, has_strain = len(tiles) > 1 and paper.height is not None, is_strained(pattern)
+    has_map, has_strain = len(pattern.tiles) > 1, is_strained(pattern)
     column = (TEXT_SHARE if has_map else HALF if has_strain else 1.0) * width
-    steps = [*_list_of_text(steps_of(pattern, tiles, paper), column, 0.0)]
+    steps = [*_list_of_text(steps_of(pattern), column, 0.0)]
     sentences = [_sentence(note) for note in (*pattern.notes, *pattern.drawing().notes)]
     room = top - bottom + float(steps[-1].place[1]) - 3 * SPACE
     room_with_notes = room - _height_of_list(sentences, column)
@@ -100,7 +93,7 @@ def _overview(
         pictures, texts = [*pictures, *strain_pictures], [*texts, *legend.texts]
         place = place + np.array([0.0, extent[1]])
     if has_map:
-        small = page_map(drawing, paper, place, extent)
+        small = page_map(pattern.drawing(), pattern.tiles, place, extent)
         lines, texts = [*lines, *small.lines], [*texts, *small.texts]
     size = width + 2 * MARGIN, height + 2 * MARGIN
     yield Page(Drawing(*size, tuple(lines), tuple(texts)), pictures=tuple(pictures))
@@ -143,14 +136,12 @@ def _summary(pattern: Pattern) -> list[str]:
     darts = f", {plural(len(cuts), noun)}" if cuts else ""
     strain = float(np.abs(pattern.strains).max())
     stretched = f"; lengths change by at most {percentage(strain)}" if strain > 1e-6 else ""
-    finish = Finish.of(pattern.kind, pattern.settings)
-    allowance = (
-        f"seam allowance {finish.allowance:g} mm, included" if finish.allowance else "no seam allowance"
-    )
+    allowance = allowance_text(pattern)
+    included = f"the {allowance} included" if allowance else "no seam allowance"
     return [
         f"{pattern.kind}: {plural(pattern.piece_count, 'piece')}{seams}{darts}; "
         f"finished size {text_of_size(extents)}",
-        f"{allowance}{stretched}",
+        f"{included}{stretched}",
     ]
 
 
@@ -188,9 +179,9 @@ def _lines_of_text(paragraphs: Sequence[str], width: float, top: float) -> Itera
         yield Text(line, np.array([MARGIN, top - i * LEADING - BODY / 2]), BODY, is_left=True)
 
 
-def _piece_table(pattern: Pattern, drawing: Drawing, paper: Paper) -> Table:
+def _piece_table(pattern: Pattern) -> Table:
     sizes = piece_sizes(pattern)
-    pages = _pages_of_pieces(pattern, drawing, paper)
+    pages = _pages_of_pieces(pattern)
     shapes = _shape_texts(pattern)
     has_shapes = any(shapes)
     rows = tuple(
@@ -222,15 +213,12 @@ def _shape_texts(pattern: Pattern) -> list[str]:
     ]
 
 
-def _pages_of_pieces(pattern: Pattern, drawing: Drawing, paper: Paper) -> list[str]:
-    """Return the names of the first and the last page on which each piece is."""
-    tiles = tiles_of(cut_shapes(drawing), drawing.width, drawing.height, paper)
-    surface, names = pattern.surface, []
-    for piece in range(pattern.piece_count):
-        points = surface.points[np.unique(surface.corners[surface.pieces == piece])]
-        low, high = points.min(axis=0), points.max(axis=0)
-        tile_names = [tile.name for tile in tiles if (tile.low < high).all() and (tile.high > low).all()]
-        names.append(" to ".join(dict.fromkeys([*tile_names[:1], *tile_names[-1:]])))
+def _pages_of_pieces(pattern: Pattern) -> list[str]:
+    """Return the names of the first and the last page on which each piece is, with its allowance and tabs."""
+    names = []
+    for shape in pattern.shapes:
+        on_pages = [tile.name for tile in pattern.tiles if tile.shows(shape.cut)]
+        names.append(" to ".join(dict.fromkeys([*on_pages[:1], *on_pages[-1:]])))
     return names
 
 

@@ -22,15 +22,12 @@ from ....atlas import (
 )
 from ....base import FloatArray
 from ....errors import OptionError
-from ....geometry import rotated_up, signed_double_areas
 from ..drawing.allowances import shapely
 from ..drawing.labels import rotated
-from ..drawing.shapes import PieceShape, piece_shapes
-from ..finish import Finish
+from ..drawing.shapes import PieceShape
+from ..drawing.tiling import crossings, tiles_of
 from ..papers import EDGE, OVERLAP, Paper
-from ..pieces.cut_surface import CutSurface
 from ..result import Pattern
-from .tiling import crossings, tiles_of
 
 if TYPE_CHECKING:
     from shapely import Polygon
@@ -53,23 +50,6 @@ MORE_PAGES = 2.0
 TURNS, MAX_PLACEMENTS = 16, 480
 
 
-def grain_up(surface: CutSurface, axis: FloatArray) -> CutSurface:
-    """Return a cut surface with each piece rotated so that a direction of the surface points up.
-
-    Args:
-        surface: the surface.
-        axis: (3,) the direction.
-    """
-    points = surface.points.copy()
-    areas = np.abs(signed_double_areas(surface.places))
-    weights = np.bincount(surface.corners.ravel(), np.repeat(areas, 3), len(points))
-    for piece in range(int(surface.pieces.max()) + 1):
-        members = np.unique(surface.corners[surface.pieces == piece])
-        positions = surface.mesh.vertices[surface.vertex_of_point[members]]
-        points[members] = rotated_up(points[members], positions, np.asarray(axis), weights[members])
-    return surface.with_points(points)
-
-
 def nested(pattern: Pattern) -> Pattern:
     """Return a pattern with its pieces side by side, at least GAP apart, allowances and tabs included.
 
@@ -80,12 +60,8 @@ def nested(pattern: Pattern) -> Pattern:
     Raises:
         OptionError: a piece is wider than the roll, or options of the pattern cannot be met.
     """
-    paper = Paper.of(pattern.settings.get("page", "A4"))
-    shapes = piece_shapes(
-        pattern.surface, pattern.borders, Finish.of(pattern.kind, pattern.settings), pattern.tabs
-    )
-    pieces = _Pieces(_outlines(shapes), _angles(shapes, pattern.has_grain))
-    return _moved(pattern, _packed(pieces, shapes, paper))
+    pieces = _Pieces(_outlines(pattern.shapes), _angles(pattern.shapes, pattern.has_grain))
+    return _moved(pattern, _packed(pieces, pattern.shapes, pattern.paper))
 
 
 @dataclass(frozen=True, eq=False)
@@ -241,8 +217,7 @@ def _moved(pattern: Pattern, packing: SheetPacking) -> Pattern:
     """Return a pattern with its pieces placed by a packing."""
     surface = pattern.surface
     points = surface.points.copy()
-    for piece in range(pattern.piece_count):
-        members = np.unique(surface.corners[surface.pieces == piece])
+    for piece, members in enumerate(surface.points_of_pieces):
         points[members] = _placed_points(points[members], packing, piece)
     tabs = tuple(
         replace(tab, polygon=_placed_points(tab.polygon, packing, tab.piece)) for tab in pattern.tabs

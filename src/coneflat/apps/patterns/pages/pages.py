@@ -2,33 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ....base import FloatArray
 from ....errors import OptionError
-from ..drawing.allowances import shapely
 from ..drawing.drawing import Drawing, Line, Text
 from ..drawing.labels import box_of, fitted_size
-from ..papers import IN_INCHES, LONGEST, MARGIN, Paper
-from .tiling import Tile, tiles_of
-
-if TYPE_CHECKING:
-    from shapely import Polygon
+from ..drawing.tiling import Tile
+from ..papers import IN_INCHES, LONGEST, MARGIN, NARROWEST, RULER, Paper
 
 # Length of crop marks, gap between them and the corner, and radius of registration marks, mm.
 CROP, CROP_GAP, REGISTRATION = 6.0, 1.5, 2.0
 # Height of capitals in margins, mm; share of the width of a page that the title takes there, between the names of
 # neighbours.
 MARGIN_TEXT, TITLE_SHARE = 2.2, 0.45
-#: Lengths of the rulers, mm and inches, and the height of their longest ticks, mm.
-RULER, RULER_INCHES, TICK = 100, 4, 4.0
-#: Height of the strip for the ruler below a drawing that is not tiled, mm.
-RULER_STRIP = 20.0
+#: Length of the ruler in inches, and the height of the longest ticks of rulers, mm.
+RULER_INCHES, TICK = 4, 4.0
 INCH = 25.4
 
 
@@ -65,44 +58,34 @@ class Page:
     pictures: tuple[Picture, ...] = ()
 
 
-def tiled(drawing: Drawing, paper: Paper, title: str) -> list[Page]:
-    """Return the pages of a drawing on a sheet, row by row; pages without a piece are left out.
+def tiled(drawing: Drawing, tiles: Sequence[Tile], paper: Paper, title: str) -> list[Page]:
+    """Return the pages of a drawing on a sheet, one for each tile.
 
     On rolls, and pages as large as the drawing, there is a ruler below the drawing.
 
     Args:
         drawing: the drawing.
+        tiles: the parts of it that are printed.
         paper: the paper.
         title: text in the margin of every page.
 
     Raises:
         OptionError: a page as large as the drawing would be larger than a PDF allows.
     """
-    if paper.width is None and max(drawing.width, drawing.height) > paper.inner_height:
-        raise OptionError(
-            f"a page of {drawing.width:.0f} x {drawing.height:.0f} mm is larger than the {LONGEST:g} mm that a PDF "
-            "allows: choose a page size or a roll, or write an SVG or DXF file"
-        )
-    tiles = tiles_of(cut_shapes(drawing), drawing.width, drawing.height, paper)
-    return [_page(drawing, tile, paper, len(tiles), title) for tile in tiles]
-
-
-def cut_shapes(drawing: Drawing) -> list[Polygon]:
-    """Return the polygons of the closed lines on the layer cut."""
-    polygons = [
-        shapely().Polygon(line.points) for line in drawing.lines if line.layer == "cut" and line.is_closed
-    ]
-    # Rounded tips of narrow slits may cross: intersections with pages need simple polygons.
-    return [polygon if polygon.is_valid else polygon.buffer(0) for polygon in polygons]
+    pages = [_page(drawing, tile, paper, len(tiles), title) for tile in tiles]
+    for page in pages:
+        if max(page.drawing.width, page.drawing.height) > LONGEST:
+            raise OptionError(
+                f"a page of {page.drawing.width:.0f} x {page.drawing.height:.0f} mm is larger than the {LONGEST:g} mm "
+                "that a PDF allows: choose a page size or a roll, or write an SVG or DXF file"
+            )
+    return pages
 
 
 def _page(drawing: Drawing, tile: Tile, paper: Paper, count: int, title: str) -> Page:
-    below = MARGIN if paper.height is not None else MARGIN + RULER_STRIP
-    low = np.array([MARGIN, below])
+    low = np.array([MARGIN, paper.below])
     size = tile.high - tile.low
-    width, height = size + low + MARGIN
-    if paper.height is None:  # The ruler may be wider than the drawing, but not than a roll.
-        width = max(width, min(RULER + 2 * MARGIN, paper.width or np.inf))
+    width, height = np.maximum(size + low + MARGIN, [NARROWEST, 0.0])
     lines: list[Line] = []
     name = f"{title}   page {tile.name} of {count}" if count > 1 else title
     place = np.array([width / 2, MARGIN / 2])
@@ -181,16 +164,15 @@ def _ruler(low: FloatArray, count: int, unit: float, name: str) -> tuple[list[Li
     return lines, [Text(name, place, MARGIN_TEXT)]
 
 
-def page_map(drawing: Drawing, paper: Paper, low: FloatArray, size: FloatArray) -> Drawing:
+def page_map(drawing: Drawing, tiles: Sequence[Tile], low: FloatArray, size: FloatArray) -> Drawing:
     """Return a small picture of the sheet with its pages and their names.
 
     Args:
         drawing: the drawing on the sheet.
-        paper: the paper.
+        tiles: its pages.
         low: (2,) the lower left corner of the place for it, mm.
         size: (2,) the width and height of the place, mm.
     """
-    tiles = tiles_of(cut_shapes(drawing), drawing.width, drawing.height, paper)
     corners = np.array([corner for tile in tiles for corner in (tile.low, tile.high)])
     first, extent = corners.min(axis=0), np.ptp(corners, axis=0)
     scale = float((size / extent).min())

@@ -5,26 +5,19 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from ....base import plural
-from ..finish import Finish
-from ..papers import OVERLAP, Paper
+from ..papers import OVERLAP
 from ..result import Pattern
-from .tiling import Tile
 
 
-def steps_of(pattern: Pattern, tiles: Sequence[Tile], paper: Paper) -> list[str]:
-    """Return the steps that a pattern needs, each a few sentences.
-
-    Args:
-        pattern: the pattern.
-        tiles: the pages on which its pieces are.
-        paper: the paper.
-    """
+def steps_of(pattern: Pattern) -> list[str]:
+    """Return the steps that a pattern needs, each a few sentences."""
     folds = _sewing(pattern) if pattern.is_sewn else _folding_and_joining(pattern)
-    return [*_printing(tiles, paper), _cutting(pattern), *folds]
+    return [*_printing(pattern), _cutting(pattern), *folds]
 
 
-def _printing(tiles: Sequence[Tile], paper: Paper) -> Iterator[str]:
-    place = "at the bottom of this page" if paper.height is not None else "below the pieces"
+def _printing(pattern: Pattern) -> Iterator[str]:
+    tiles = pattern.tiles
+    place = "at the bottom of this page" if pattern.paper.height is not None else "below the pieces"
     yield (
         f"Print at 100 % (actual size), without fitting to the page. Measure the ruler {place}: it is 100 mm long."
     )
@@ -42,15 +35,23 @@ def _cutting(pattern: Pattern) -> str:
     text = f"Cut out {noun} along the solid black lines"
     if not pattern.is_sewn:
         return f"{text}."
-    allowance = Finish.of(pattern.kind, pattern.settings).allowance
-    text += (
-        f"; the seam allowance of {allowance:g} mm is included." if allowance else "; add no seam allowance."
-    )
+    allowance = allowance_text(pattern)
+    text += f"; the {allowance} included." if allowance else "; add no seam allowance."
     if pattern.has_grain:
         text += " Lay them on the cloth with the arrow along its grain."
     text += _doubled_cloth(pattern)
     marks = "numbers, notches and the tips of darts" if pattern.darts else "numbers and notches"
     return f"{text} Transfer {marks}."
+
+
+def allowance_text(pattern: Pattern) -> str:
+    """Return how wide the seam allowances are, with a verb; "" if there are none."""
+    widths = pattern.allowances
+    if not any(widths):
+        return ""
+    if len(widths) == 1:
+        return f"seam allowance of {widths[0]:g} mm is"
+    return f"seam allowances of {widths[0]:g} to {widths[-1]:g} mm are"
 
 
 def _doubled_cloth(pattern: Pattern) -> str:

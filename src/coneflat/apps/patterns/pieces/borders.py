@@ -11,7 +11,7 @@ import numpy as np
 from .... import TriangleMesh
 from ....base import IntArray
 from .cut_surface import CutSurface
-from .numbering import DIRECTION, order_by_size
+from .numbering import DIRECTION, letters, order_by_size
 from .polylines import distances
 
 #: Difference of the lengths of the sides of a seam that can be neglected, mm.
@@ -246,12 +246,3 @@ def _seam(surface: CutSurface, name: str, first: Side, second: Side) -> Seam:
     on_surface = surface.edge_lengths[surface.mesh.halfedge_edges[first.halfedges]].sum()
     gap = float(np.abs(along[0] - matching).max())
     return Seam(name, (first, second), (float(along[0][-1]), float(along[1][-1])), float(on_surface), gap)
-
-
-def letters(number: int) -> str:
-    """Return A, B, ..., Z, AA, AB, ... for a number from 0."""
-    name = ""
-    while number >= 0:
-        number, digit = divmod(number, 26)
-        name, number = chr(ord("A") + digit) + name, number - 1
-    return name

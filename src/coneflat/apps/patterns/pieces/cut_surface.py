@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -83,6 +84,17 @@ class CutSurface:
     def piece_count(self) -> int:
         """The number of pieces."""
         return int(self.pieces.max()) + 1
+
+    @cached_property
+    def triangles_of_pieces(self) -> list[IntArray]:
+        """The triangles (k,) of each piece."""
+        order = np.argsort(self.pieces, kind="stable")
+        return np.split(order, np.cumsum(np.bincount(self.pieces))[:-1])
+
+    @property
+    def points_of_pieces(self) -> Iterator[IntArray]:
+        """The points (k,) of each piece, in the order of the pieces."""
+        return (np.unique(self.corners[triangles]) for triangles in self.triangles_of_pieces)
 
     @cached_property
     def piece_of_point(self) -> IntArray:

@@ -1,4 +1,4 @@
-"""The order of pieces and sides: it depends on the shape of the surface, not on the numbering of its vertices."""
+"""The order of pieces and sides, which depends on the shape of the surface, not on its numbering; names by number."""
 
 from __future__ import annotations
 
@@ -37,3 +37,12 @@ def order_around(positions: FloatArray, axis: FloatArray) -> IntArray:
     moved = positions - positions.mean(axis=0)
     angles = np.arctan2(moved @ np.cross(upward, right), moved @ right) % (2 * np.pi)
     return np.argsort(angles, kind="stable")
+
+
+def letters(number: int) -> str:
+    """Return A, B, ..., Z, AA, AB, ... for a number from 0."""
+    name = ""
+    while number >= 0:
+        number, digit = divmod(number, 26)
+        name, number = chr(ord("A") + digit) + name, number - 1
+    return name

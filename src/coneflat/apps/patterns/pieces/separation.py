@@ -18,7 +18,7 @@ def without_overlaps(surface: CutSurface) -> CutSurface:
         return surface
     places, seams = surface.places.copy(), [surface.seams]
     for piece in np.unique(surface.pieces[pairs[:, 0]]).tolist():
-        faces = np.flatnonzero(surface.pieces == piece)
+        faces = surface.triangles_of_pieces[piece]
         indices, corners = np.unique(surface.corners[faces], return_inverse=True)
         points = surface.points[indices]
         mesh = TriangleMesh(np.pad(points, ((0, 0), (0, 1))), corners.reshape(-1, 3))

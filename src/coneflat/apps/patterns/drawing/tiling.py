@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import ceil
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ....base import FloatArray
-from ..drawing.allowances import shapely
 from ..papers import EDGE, OVERLAP, Paper
-from ..pieces.borders import letters
+from ..pieces.numbering import letters
+from .allowances import shapely
 
 if TYPE_CHECKING:
     from shapely import Polygon
@@ -38,24 +38,34 @@ class Tile:
     neighbours: tuple[str, str, str, str]
     overlaps: bool
 
+    def shows(self, shape: Polygon) -> bool:
+        """Return whether any part of a shape is on the tile."""
+        return bool(shape.intersection(shapely().box(*self.low, *self.high)).area > ROUNDING)
+
 
 def tiles_of(shapes: Sequence[Polygon], width: float, height: float, paper: Paper) -> list[Tile]:
     """Return the tiles of a sheet with anything on them, row by row from the top.
 
-    Tiles overlap, unless no piece crosses the borders of pages side by side.
+    Tiles overlap, unless no piece crosses the borders of pages side by side. A page as large as the sheet is a single
+    tile, and the last one of a roll ends with the sheet.
 
     Args:
         shapes: what is cut out of the sheet.
         width, height: size of the sheet, mm.
         paper: the paper.
     """
-    size = np.array([min(paper.inner_width, width), min(paper.inner_height, height)])
-    if paper.height is not None:
+    if paper.width is None:
+        size = np.array([width, height])
+    elif paper.height is None:
+        size = np.array([min(paper.inner_width, width), min(paper.inner_height, height)])
+    else:
         size = np.array([paper.inner_width, paper.inner_height])
-    side_by_side = _tiles(shapes, width, height, size, 0.0)
-    if not crossings(shapes, side_by_side):
-        return side_by_side
-    return _tiles(shapes, width, height, size, OVERLAP)
+    tiles = _tiles(shapes, width, height, size, 0.0)
+    if crossings(shapes, tiles):
+        tiles = _tiles(shapes, width, height, size, OVERLAP)
+    if paper.height is not None:
+        return tiles
+    return [replace(tile, high=np.minimum(tile.high, [width, height])) for tile in tiles]
 
 
 def _tiles(
