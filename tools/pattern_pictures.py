@@ -17,8 +17,6 @@ from measured import Measured
 from PIL import Image, ImageOps
 
 import coneflat
-from coneflat.apps.patterns.drawing.shapes import piece_shapes
-from coneflat.apps.patterns.finish import Finish
 from coneflat.apps.patterns.pages.views import piece_colour, view_of
 from coneflat.apps.view import eye_direction
 from coneflat.apps.view.figures.cone_marks import pixels_of
@@ -155,9 +153,8 @@ def draw_model_of(pattern: coneflat.Pattern, axes: Any, eye: str, dpi: float) ->
 
 def draw_pieces(pattern: coneflat.Pattern, axes: Any) -> None:
     """Draw the pieces of a pattern in the colours of `draw_model_of`, with their seam lines."""
-    drawing, surface = pattern.drawing(), pattern.surface
-    shapes = piece_shapes(surface, pattern.borders, Finish.of(pattern.kind, pattern.settings), pattern.tabs)
-    for piece, shape in enumerate(shapes):
+    drawing = pattern.drawing()
+    for piece, shape in enumerate(pattern.shapes):
         axes.fill(*shape.cut_rings[0].T, facecolor=piece_colour(piece), edgecolor="black", linewidth=0.8)
     for line in drawing.lines:
         if line.dashes:
