@@ -22,10 +22,7 @@ from .pieces.borders import Seam
 from .pieces.cut_surface import CutSurface
 from .report import rows_of
 from .result import Pattern
-from .units import percentage
-
-# Strain up to which a pattern is as exact as numbers are.
-EXACT = 1e-6
+from .units import EXACT_STRAIN, percentage
 
 
 def page_of_pattern(pattern: Pattern, *, name: str = "Pattern", show: str = "charts", **look: Any) -> str:
@@ -34,7 +31,7 @@ def page_of_pattern(pattern: Pattern, *, name: str = "Pattern", show: str = "cha
     cuts, noun = (pattern.darts, "dart") if pattern.is_sewn else (pattern.corner_cuts, "corner cut")
     counts = {"piece": pattern.piece_count, "seam": len(pattern.seams) - len(cuts), noun: len(cuts)}
     parts = [plural(count, counted) for counted, count in counts.items() if count]
-    if strain > EXACT:
+    if strain > EXACT_STRAIN:
         parts.append(f"strain {percentage(strain)}")
     text = PageText(title="  ·  ".join(parts), rows=rows_of(pattern))
     return page_html(as_flattening(pattern), name=name, show=show, text=text, parts=parts_of(pattern), **look)

@@ -14,7 +14,7 @@ from ..drawing.labels import fitted_size
 from ..papers import DEFAULT_PAPER, IN_INCHES, MARGIN, Paper
 from ..report import piece_sizes
 from ..result import Pattern
-from ..units import area_text, percentage, text_of_size
+from ..units import EXACT_STRAIN, area_text, percentage, text_of_size
 from .pages import Page, Picture, page_map, ruler
 from .steps import allowance_text, steps_of
 from .strain_map import is_strained, strain_map
@@ -135,7 +135,7 @@ def _summary(pattern: Pattern) -> list[str]:
     cuts, noun = (pattern.darts, "dart") if pattern.is_sewn else (pattern.corner_cuts, "corner cut")
     darts = f", {plural(len(cuts), noun)}" if cuts else ""
     strain = float(np.abs(pattern.strains).max())
-    stretched = f"; lengths change by at most {percentage(strain)}" if strain > 1e-6 else ""
+    stretched = f"; edges change by at most {percentage(strain)}" if strain > EXACT_STRAIN else ""
     allowance = allowance_text(pattern)
     included = f"the {allowance} included" if allowance else "no seam allowance"
     return [
