@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...base import FloatArray, component_at_work, timing, warns
+from ...base import component_at_work, timing, warns
 from ...options import read_options, settings, takes
 from .cloth.cloth import cloth_pieces
 from .drawing.gaps import notes_on_gaps, notes_on_short_seams
@@ -71,18 +71,6 @@ def pattern(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Patter
             return _placed(model, developed, parsed)
 
 
-def _cloth(model: Model, options: PatternOptions) -> Development:
-    # The only axis of cloth is its grain.
-    return cloth_pieces(replace(model, axis=_grain(model, options)), options)
-
-
-def _grain(model: Model, options: PatternOptions) -> FloatArray:
-    """Return (3,) the direction of the grain; without one, the upward direction."""
-    if not isinstance(options.grain, tuple):
-        return model.axis
-    return np.array(options.grain) / np.linalg.norm(options.grain)
-
-
 def _net(model: Model, options: PatternOptions) -> Development:
     return unfold_net(model.mesh)
 
@@ -91,7 +79,7 @@ def _gores(model: Model, options: PatternOptions) -> Development:
     developed = cut_gores(model.mesh, options.gores, model.axis)
     surface = developed.surface
     if isinstance(options.grain, tuple):
-        surface = grain_up(surface, _grain(model, options))
+        surface = grain_up(surface, model.grain)
     centres = piece_areas(surface.mesh, surface.pieces)[1]
     rank = np.argsort(order_around(centres, model.axis))
     return replace(developed, surface=replace(surface, sequence=rank[surface.pieces]))
@@ -102,7 +90,7 @@ def _sheet(model: Model, options: PatternOptions) -> Development:
 
 
 _METHODS: Mapping[str, Callable[[Model, PatternOptions], Development]] = {
-    "cloth": _cloth,
+    "cloth": cloth_pieces,
     "net": _net,
     "gores": _gores,
     "sheet": _sheet,
@@ -121,7 +109,7 @@ def _placed(model: Model, developed: Development, options: PatternOptions) -> Pa
         settings={
             **settings(options),
             "axis": tuple(model.axis.tolist()),
-            "grain": options.grain if options.grain == "none" else tuple(_grain(model, options).tolist()),
+            "grain": options.grain if options.grain == "none" else tuple(model.grain.tolist()),
         },
     )
     if options.kind == "net" and options.tabs > 0:

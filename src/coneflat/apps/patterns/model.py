@@ -36,7 +36,8 @@ class Model:
 
     Attributes:
         mesh: the mesh, mm.
-        axis: (3,) unit vector of its upward direction, along which the grain is.
+        axis: (3,) unit vector of its upward direction.
+        grain: (3,) unit vector along which the grain is; the upward one unless another one is given.
         millimetres: millimetres per unit of the input.
         seams: (k, 2) the vertices of edges that must be cut; None for none.
         notes: what was changed or assumed, one sentence each.
@@ -44,6 +45,7 @@ class Model:
 
     mesh: TriangleMesh
     axis: FloatArray
+    grain: FloatArray
     millimetres: float
     seams: IntArray | None
     notes: tuple[str, ...]
@@ -75,7 +77,10 @@ def read_model(mesh: Any, faces: ArrayLike | None, options: PatternOptions) -> M
             "a smaller scale, or a height"
         )
     scaled = sound.mesh.moved_to(vertices * factor)
-    return Model(scaled, axis, factor, sound.seams, (*checked.notes, *notes, *sound.notes()))
+    grain = axis
+    if isinstance(options.grain, tuple):
+        grain = np.array(options.grain) / np.linalg.norm(options.grain)
+    return Model(scaled, axis, grain, factor, sound.seams, (*checked.notes, *notes, *sound.notes()))
 
 
 def _guessed_axis(vertices: FloatArray, faces: IntArray, ending: str) -> FloatArray:

@@ -100,9 +100,9 @@ def unmet(surface: CutSurface, stretch: Stretch, options: PatternOptions) -> Ite
         worst = int(beyond.argmax())
         strain = abs(float(surface.edges.strains(surface.points)[worst]))
         yield (
-            f"{plural(int((beyond > 0).sum()), 'edge')} of {len(beyond):,} are strained more than allowed, up to "
-            f"{percentage(strain)} instead of {percentage(strain / (1 + beyond[worst]))}, and no cut with less was "
-            "found: allow more, or refine the mesh there."
+            f"The strain is beyond its bound at {int((beyond > 0).sum()):,} of {plural(len(beyond), 'edge')}: up to "
+            f"{percentage(strain)} instead of {percentage(strain / (1 + beyond[worst]))}. No cut with less was found: "
+            "allow more, or refine the mesh there."
         )
     darts = sum(seam.is_dart for seam in find_borders(surface).seams)
     if options.darts == "none" and darts:
@@ -140,7 +140,7 @@ def cut_cloth(model: Model, stretch: Stretch, required: IntArray) -> CutSurface:
 def _texture(model: Model, max_energy: float) -> CutSurface:
     mesh = model.mesh
     texture = unwrap(mesh.vertices, mesh.faces, max_energy=max_energy, packing_cuts=0.0, seams=model.seams)
-    return grain_up(CutSurface.of(texture), model.axis)
+    return grain_up(CutSurface.of(texture), model.grain)
 
 
 def without_darts(surface: CutSurface, stretch: Stretch) -> CutSurface:

@@ -43,7 +43,7 @@ def half_of_model(model: Model) -> HalfModel | None:
     symmetry. A model with seams of its own has no half.
     """
     planes = [] if model.seams is not None else list(islice(symmetry_planes(model.mesh), 2))
-    if len(planes) != 1 or abs(model.axis @ planes[0].normal) > IN_PLANE:
+    if len(planes) != 1 or abs(model.grain @ planes[0].normal) > IN_PLANE:
         return None
     half = half_of(model.mesh)
     return None if half is None else HalfModel(replace(model, mesh=half.mesh), half.plane)
