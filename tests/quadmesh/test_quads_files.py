@@ -35,7 +35,7 @@ class TestObj:
         assert uv.max() <= 1
         sides = np.roll(uv, -1, axis=1) - uv
         np.testing.assert_allclose(np.linalg.norm(sides, axis=2), np.linalg.norm(sides[0, 0]))
-        assert (np.cross(sides[:, 0], sides[:, 1]) > 0).all()
+        assert (np.linalg.det(sides[:, :2]) > 0).all()
         assert len(np.unique(np.round(uv.mean(axis=1), 9), axis=0)) == len(uv)
 
     @pytest.mark.parametrize("is_flat", [False, True])
