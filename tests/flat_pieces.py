@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import shapes
 
-from coneflat import Pattern, TriangleMesh
+from coneflat import Pattern, TriangleMesh, unwrap
 from coneflat.apps.patterns.pieces.cut_surface import CutSurface
 from coneflat.geometry import signed_double_areas
 
@@ -103,3 +104,8 @@ def assert_lawful(pattern: Pattern) -> None:
     assert not len(surface.overlaps())
     lengths = np.array([seam.lengths for seam in pattern.seams]).reshape(-1, 2)
     assert np.abs(lengths[:, 0] - lengths[:, 1]).max(initial=0.0) < 1e-6
+
+
+def cut_sphere(energy=4.05):
+    """A sphere of 320 triangles, cut as a texture is."""
+    return CutSurface.of(unwrap(*shapes.sphere(2), max_energy=energy, packing_cuts=0))

@@ -20,7 +20,7 @@ _HOMES = {
     "doubled": "mirrored",
     "extract_quads": "extract",
     "find_domains": "domains",
-    "half_of": "mirrored",
+    "half_beside": "mirrored",
     "holds_quads": "files",
     "integer_grid": "quad_meshing",
     "measure_quads": "quality",
@@ -48,7 +48,7 @@ __all__ = [
     "doubled",
     "extract_quads",
     "find_domains",
-    "half_of",
+    "half_beside",
     "holds_quads",
     "integer_grid",
     "measure_quads",
@@ -74,7 +74,7 @@ if TYPE_CHECKING:
     )
     from .integer_map import IntegerGrid
     from .mirror_planes import MirrorPlane, symmetry_planes
-    from .mirrored import Half, doubled, half_of
+    from .mirrored import Half, doubled, half_beside
     from .options import QUADS, QuadOptions, Sizes
     from .quad_mesh import QuadMesh
     from .quad_meshing import integer_grid, quads

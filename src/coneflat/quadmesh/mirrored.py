@@ -50,11 +50,11 @@ def half_of(mesh: TriangleMesh) -> Half | None:
 
     Of several planes it is that of the shortest cut, along which a grid must have lines.
     """
-    halves = [half for plane in symmetry_planes(mesh) if (half := _half_beside(mesh, plane)) is not None]
+    halves = [half for plane in symmetry_planes(mesh) if (half := half_beside(mesh, plane)) is not None]
     return min(halves, key=lambda half: round(half.length / half.plane.size, 6), default=None)
 
 
-def _half_beside(mesh: TriangleMesh, plane: MirrorPlane) -> Half | None:
+def half_beside(mesh: TriangleMesh, plane: MirrorPlane) -> Half | None:
     """Return the half of a surface beside a plane, None if the plane does not divide it along a curve.
 
     This is so if triangles lie in the plane, or edges of the boundary.

@@ -12,7 +12,7 @@ from itertools import islice
 
 import numpy as np
 
-from ....quadmesh import MirrorPlane, doubled, half_of, symmetry_planes
+from ....quadmesh import MirrorPlane, doubled, half_beside, symmetry_planes
 from ..model import Model
 from ..pieces.cut_surface import CutSurface
 from ..pieces.strain import Stretch
@@ -45,7 +45,7 @@ def half_of_model(model: Model) -> HalfModel | None:
     planes = [] if model.seams is not None else list(islice(symmetry_planes(model.mesh), 2))
     if len(planes) != 1 or abs(model.grain @ planes[0].normal) > IN_PLANE:
         return None
-    half = half_of(model.mesh)
+    half = half_beside(model.mesh, planes[0])
     return None if half is None else HalfModel(replace(model, mesh=half.mesh), half.plane)
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -64,10 +63,6 @@ class Drawing:
     lines: tuple[Line, ...]
     texts: tuple[Text, ...] = ()
     notes: tuple[str, ...] = ()
-
-    def with_marks(self, lines: Sequence[Line], texts: Sequence[Text] = ()) -> Drawing:
-        """Return the drawing with more lines and texts."""
-        return replace(self, lines=(*self.lines, *lines), texts=(*self.texts, *texts))
 
     def moved(self, shift: FloatArray) -> Drawing:
         """Return the drawing with everything on it moved by (2,) mm on the same sheet."""

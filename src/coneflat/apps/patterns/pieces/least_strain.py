@@ -38,7 +38,8 @@ def least_strain(
         corners: (m, 3) the points of its triangles.
         points: (n, 2) places without flipped triangles to start from.
         stretch: what the material allows.
-        exponents: of the strain, whose sum over all edges, weighted by squared lengths, is minimised for each in turn.
+        exponents: of the strain, whose sum over all edges, weighted by squared lengths, is minimised for one after
+            the other.
         is_free: (n,) the points that move; None for all.
         until_within: whether exponents are left out once all strains are within what the material allows.
 
